@@ -1,0 +1,75 @@
+"""Every error that mjcartpole raises on purpose.
+
+    MjCartPoleError
+    ├── ConfigError            a setting that makes no sense (also a ValueError)
+    ├── ModelError             an MJCF that cannot be used (also a ValueError)
+    │   ├── ModelNotFoundError     no such name or file
+    │   ├── ModelSyntaxError       MuJoCo does not accept the document
+    │   └── NotACartPoleError      it compiles, but is no cart-pole
+    ├── StepError              an env used in a way that its rules refuse
+    │   ├── InvalidActionError     an action outside Discrete(2) (also an AssertionError)
+    │   └── ResetNeededError       a step before the first reset (also an AssertionError)
+    ├── SimulationError        the physics diverged
+    ├── FileError              a file or folder that cannot be read or written
+    │   ├── PolicyFileError        no policy, or a damaged one
+    │   └── RunError               a run folder that is missing, incomplete or in the way
+    └── RenderError            no picture or no video can be made
+
+A message says what was asked, what was found, what is available and the next step, in one line.
+"""
+
+
+class MjCartPoleError(Exception):
+    """Base of all errors of this package."""
+
+
+class ConfigError(MjCartPoleError, ValueError):
+    """A setting makes no sense."""
+
+
+class ModelError(MjCartPoleError, ValueError):
+    """An MJCF model cannot be used."""
+
+
+class ModelNotFoundError(ModelError):
+    """No model has this name, or no file this path."""
+
+
+class ModelSyntaxError(ModelError):
+    """MuJoCo does not accept the document."""
+
+
+class NotACartPoleError(ModelError):
+    """The model compiles but lacks a part of a cart-pole, or has one too many."""
+
+
+class StepError(MjCartPoleError):
+    """An environment was used in a way that its rules refuse."""
+
+
+class InvalidActionError(StepError, AssertionError):
+    """An action is outside the action space (CartPole-v1 raises AssertionError here)."""
+
+
+class ResetNeededError(StepError, AssertionError):
+    """`step` came before `reset` (CartPole-v1 raises AssertionError here)."""
+
+
+class SimulationError(MjCartPoleError):
+    """The simulation diverged: a position or velocity is NaN or beyond all bounds."""
+
+
+class FileError(MjCartPoleError):
+    """A file or folder cannot be read or written."""
+
+
+class PolicyFileError(FileError):
+    """A file is no policy of this package, or is damaged."""
+
+
+class RunError(FileError):
+    """A run folder is missing, incomplete, or already there."""
+
+
+class RenderError(MjCartPoleError):
+    """A picture or a video cannot be made."""

@@ -1,0 +1,1 @@
+"""From an MJCF file to one control step."""

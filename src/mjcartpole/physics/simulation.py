@@ -1,0 +1,141 @@
+"""State in, control in, state out: a cart-pole moved by MuJoCo, one control step at a time."""
+
+from collections.abc import Callable
+from typing import Literal, get_args
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+
+from mjcartpole.errors import ConfigError, SimulationError
+from mjcartpole.physics.model import CartPole
+
+Integrator = Literal["gym", "mujoco"]
+"""Who moves the state: explicit Euler as CartPole-v1 does, or the file's own integrator."""
+
+State = tuple[float, float, float, float]
+"""`(x, x_dot, theta, theta_dot)`: m, m/s, rad, rad/s."""
+
+LARGEST_SANE: float = mujoco.mjMAXVAL
+"""MuJoCo calls a coordinate beyond this bad (1e10)."""
+
+
+class Simulation:
+    """One cart-pole in motion.
+
+    `gym` moves positions by the *old* velocities, `q_next = q + h v`, as CartPole-v1 does;
+    velocities move by the acceleration that MuJoCo computes. `mujoco` leaves all to the
+    integrator that the file names.
+
+    Attributes:
+        cartpole: What is simulated.
+        data: MuJoCo's data; its qpos and qvel are the state.
+        step: `step(control)` advances 0.02 s and returns the new state as four floats. It is a
+            closure over the arrays, since looking them up costs as much as the physics.
+    """
+
+    def __init__(self, cartpole: CartPole, integrator: Integrator = "gym") -> None:
+        """Prepare a simulation; the state starts at the model's reference position.
+
+        Raises:
+            ConfigError: The integrator is unknown.
+        """
+        if integrator not in get_args(Integrator):
+            raise ConfigError(
+                f"integrator {integrator!r} is unknown; available: {', '.join(get_args(Integrator))}"
+            )
+        self.cartpole = cartpole
+        self.integrator = integrator
+        self._model = _stepping_model(cartpole.model, integrator)
+        self.data = mujoco.MjData(self._model)
+        self.step: Callable[[float], State] = self._make_step()
+
+    @property
+    def state(self) -> npt.NDArray[np.float64]:
+        """The state `(x, x_dot, theta, theta_dot)`, shape (4,), a copy."""
+        qpos, qvel = self.data.qpos, self.data.qvel
+        slider, hinge = self.cartpole.slider, self.cartpole.hinge
+        return np.array([qpos[slider], qvel[slider], qpos[hinge], qvel[hinge]])
+
+    @state.setter
+    def state(self, state: npt.ArrayLike) -> None:
+        """Put the cart-pole into a state; nothing of its past remains."""
+        values = np.asarray(state, dtype=np.float64)
+        if values.shape != (4,):
+            raise ConfigError(
+                f"a state has 4 values (x, x_dot, theta, theta_dot), not the shape {values.shape}"
+            )
+        mujoco.mj_resetData(self._model, self.data)
+        slider, hinge = self.cartpole.slider, self.cartpole.hinge
+        self.data.qpos[slider], self.data.qvel[slider] = values[0], values[1]
+        self.data.qpos[hinge], self.data.qvel[hinge] = values[2], values[3]
+
+    def _make_step(self) -> Callable[[float], State]:
+        substeps = self.cartpole.substeps
+        if self.integrator == "gym":
+            return _explicit_euler(self._model, self.data, self.cartpole, substeps)
+        return _own_integrator(self._model, self.data, self.cartpole, substeps)
+
+
+def _stepping_model(model: mujoco.MjModel, integrator: Integrator) -> mujoco.MjModel:
+    """The model as it is stepped; options are no geometry, so changing them leaves no value stale.
+
+    MuJoCo answers a NaN by silently starting over from the reference position, a pole that
+    stands by magic. That is switched off, so that the NaN can be seen and reported.
+    """
+    stepped = mujoco.MjModel.__copy__(model)
+    stepped.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+    if integrator == "gym":
+        # Explicit Euler takes the acceleration as it is, so no implicit damping either.
+        stepped.opt.integrator = mujoco.mjtIntegrator.mjINT_EULER
+        stepped.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_EULERDAMP)
+    return stepped
+
+
+def _explicit_euler(
+    model: mujoco.MjModel, data: mujoco.MjData, cartpole: CartPole, substeps: int
+) -> Callable[[float], State]:
+    # Memory views read and write single floats several times faster than numpy arrays do.
+    qpos, qvel, ctrl = memoryview(data.qpos), memoryview(data.qvel), memoryview(data.ctrl)
+    slider, hinge, h = cartpole.slider, cartpole.hinge, float(model.opt.timestep)
+    mj_step = mujoco.mj_step
+
+    def step(control: float) -> State:
+        ctrl[0] = control
+        for _ in range(substeps):
+            x = qpos[slider] + h * qvel[slider]
+            theta = qpos[hinge] + h * qvel[hinge]
+            mj_step(model, data)
+            qpos[slider] = x
+            qpos[hinge] = theta
+        return x, qvel[slider], theta, qvel[hinge]
+
+    return step
+
+
+def _own_integrator(
+    model: mujoco.MjModel, data: mujoco.MjData, cartpole: CartPole, substeps: int
+) -> Callable[[float], State]:
+    qpos, qvel, ctrl = memoryview(data.qpos), memoryview(data.qvel), memoryview(data.ctrl)
+    slider, hinge = cartpole.slider, cartpole.hinge
+    mj_step = mujoco.mj_step
+
+    def step(control: float) -> State:
+        ctrl[0] = control
+        mj_step(model, data, substeps)
+        return qpos[slider], qvel[slider], qpos[hinge], qvel[hinge]
+
+    return step
+
+
+def check_sane(state: State, model_name: str) -> None:
+    """Raise if a simulation has diverged.
+
+    Raises:
+        SimulationError: A value is NaN, infinite or beyond `LARGEST_SANE`.
+    """
+    if not all(-LARGEST_SANE < value < LARGEST_SANE for value in state):
+        raise SimulationError(
+            f"the simulation of {model_name} diverged: state (x, x_dot, theta, theta_dot) = {state}; "
+            "look for tiny masses, huge forces or a long timestep in the model"
+        )

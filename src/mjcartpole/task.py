@@ -1,0 +1,64 @@
+"""CartPole-v1's rules as numbers and pure functions.
+
+Only the rules: no physics engine, no gymnasium. The numbers are those of gymnasium's
+`CartPole-v1` (Barto, Sutton and Anderson, 1983, doi:10.1109/TSMC.1983.6313077).
+"""
+
+import math
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+CONTROL_STEP: Final = 0.02
+"""Seconds between two actions."""
+
+X_LIMIT: Final = 2.4
+"""The cart's centre may be this far from the middle of the track, in metres."""
+
+THETA_LIMIT: Final = 12 * 2 * math.pi / 360
+"""The pole may lean this far, in radians: 12 degrees, by gymnasium's own expression."""
+
+RESET_LOW: Final = -0.05
+RESET_HIGH: Final = 0.05
+"""Each of the four state values starts uniformly between these two."""
+
+TIME_LIMIT: Final = 500
+"""Control steps until an episode is truncated (the registration's business, not the env's)."""
+
+REWARD_THRESHOLD: Final = 475.0
+"""Mean return at which CartPole-v1 counts as solved."""
+
+N_ACTIONS: Final = 2
+"""0 pushes to the left (-x), 1 to the right (+x)."""
+
+
+def observation_bound() -> npt.NDArray[np.float32]:
+    """Upper bound of the observation, shape (4,); the lower bound is its negative.
+
+    Positions may be twice as large as the limits that end an episode, so that the observation of
+    the last step still lies inside; velocities are unbounded.
+    """
+    return np.array([X_LIMIT * 2, np.inf, THETA_LIMIT * 2, np.inf], dtype=np.float32)
+
+
+def has_terminated(x: float, theta: float) -> bool:
+    """Whether the cart (m) has left the track or the pole (rad) has fallen.
+
+    The comparison is strict: a state exactly on a limit is still in play.
+    """
+    return x < -X_LIMIT or x > X_LIMIT or theta < -THETA_LIMIT or theta > THETA_LIMIT
+
+
+def reward(*, terminated: bool, already_over: bool, sutton_barto: bool) -> float:
+    """Reward of one control step.
+
+    Args:
+        terminated: Whether the state after the step ends the episode.
+        already_over: Whether the episode had ended before this step.
+        sutton_barto: Use 0 per step and -1 at the end (Sutton and Barto's formulation) instead
+            of 1 per step, the last one included.
+    """
+    if sutton_barto:
+        return -1.0 if terminated else 0.0
+    return 0.0 if terminated and already_over else 1.0
