@@ -1,0 +1,71 @@
+"""CartPole-v1 as real physics: an MJCF cart-pole in MuJoCo, a Q-table, and a video.
+
+    import gymnasium
+    import mjcartpole
+
+    env = gymnasium.make("mjcartpole/CartPole-v1")
+
+    result = mjcartpole.train(mjcartpole.TrainConfig.preset("tuned", backend="mujoco", seed=3))
+
+Importing the package registers the environment and nothing else: MuJoCo, OpenGL and the video
+libraries are imported when they are first needed.
+"""
+
+import importlib
+from typing import TYPE_CHECKING
+
+from mjcartpole.envs.registration import ENV_ID, register
+
+if TYPE_CHECKING:
+    from mjcartpole.envs.cartpole import CartPoleEnv
+    from mjcartpole.learning.policy import Policy
+    from mjcartpole.learning.training import TrainConfig, TrainResult, train
+    from mjcartpole.physics.model import CartPole, load_model, model_names
+    from mjcartpole.physics.simulation import Simulation
+    from mjcartpole.studies.evaluation import Evaluation, evaluate
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "ENV_ID",
+    "CartPole",
+    "CartPoleEnv",
+    "Evaluation",
+    "Policy",
+    "Simulation",
+    "TrainConfig",
+    "TrainResult",
+    "evaluate",
+    "load_model",
+    "model_names",
+    "train",
+]
+
+_HOMES = {
+    "CartPole": "physics.model",
+    "CartPoleEnv": "envs.cartpole",
+    "Evaluation": "studies.evaluation",
+    "Policy": "learning.policy",
+    "Simulation": "physics.simulation",
+    "TrainConfig": "learning.training",
+    "TrainResult": "learning.training",
+    "evaluate": "studies.evaluation",
+    "load_model": "physics.model",
+    "model_names": "physics.model",
+    "train": "learning.training",
+}
+
+register()
+
+
+def __getattr__(name: str) -> object:
+    """Import a public name from its module when it is first asked for."""
+    if name not in _HOMES:
+        raise AttributeError(f"module 'mjcartpole' has no attribute {name!r}")
+    value = getattr(importlib.import_module(f"mjcartpole.{_HOMES[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -2,7 +2,7 @@
 
 import contextlib
 import os
-import tempfile
+import secrets
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -60,22 +60,12 @@ def _make_temporary(target: Path) -> Path:
     make_folder(target.parent)
     if target.is_dir():
         raise FileError(f"cannot write '{target}': it is a folder; give the path of a file")
+    temporary = target.with_name(f".{target.stem}-{secrets.token_hex(4)}{target.suffix}")
     try:
-        handle, name = tempfile.mkstemp(
-            prefix=f".{target.stem}-", suffix=target.suffix, dir=target.parent
-        )
-        os.fchmod(handle, 0o666 & ~_umask())
-        os.close(handle)
+        temporary.touch(exist_ok=False)
     except OSError as error:
         raise FileError(f"cannot write '{target}': {_reason(error)}") from error
-    return Path(name)
-
-
-def _umask() -> int:
-    """The process's umask, which can only be read by setting it."""
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
+    return temporary
 
 
 def _sync(path: Path) -> None:

@@ -57,9 +57,12 @@ class Simulation:
         slider, hinge = self.cartpole.slider, self.cartpole.hinge
         return np.array([qpos[slider], qvel[slider], qpos[hinge], qvel[hinge]])
 
-    @state.setter
-    def state(self, state: npt.ArrayLike) -> None:
-        """Put the cart-pole into a state; nothing of its past remains."""
+    def set_state(self, state: npt.ArrayLike) -> None:
+        """Put the cart-pole into a state `(x, x_dot, theta, theta_dot)`; nothing of its past remains.
+
+        Raises:
+            ConfigError: The state has not four values.
+        """
         values = np.asarray(state, dtype=np.float64)
         if values.shape != (4,):
             raise ConfigError(
@@ -102,15 +105,19 @@ def _explicit_euler(
 
     def step(control: float) -> State:
         ctrl[0] = control
-        for _ in range(substeps):
-            x = qpos[slider] + h * qvel[slider]
-            theta = qpos[hinge] + h * qvel[hinge]
-            mj_step(model, data)
-            qpos[slider] = x
-            qpos[hinge] = theta
+        x = qpos[slider] + h * qvel[slider]
+        theta = qpos[hinge] + h * qvel[hinge]
+        mj_step(model, data)
+        qpos[slider] = x
+        qpos[hinge] = theta
         return x, qvel[slider], theta, qvel[hinge]
 
-    return step
+    def several_steps(control: float) -> State:
+        for _ in range(substeps - 1):
+            step(control)
+        return step(control)
+
+    return step if substeps == 1 else several_steps
 
 
 def _own_integrator(

@@ -1,0 +1,52 @@
+"""Who does the physics: our MuJoCo cart-pole or gymnasium's CartPole-v1, behind one interface."""
+
+from typing import Any, Literal, get_args
+
+import gymnasium
+
+from mjcartpole.envs.registration import ENV_ID
+from mjcartpole.errors import ConfigError
+from mjcartpole.physics.simulation import Integrator
+
+Backend = Literal["mujoco", "gym"]
+
+GYM_ID = "CartPole-v1"
+
+
+def check_backend(backend: str, model: str, integrator: str) -> None:
+    """Refuse a backend that does not exist, or settings that it would ignore.
+
+    Raises:
+        ConfigError: See above.
+    """
+    if backend not in get_args(Backend):
+        raise ConfigError(
+            f"backend '{backend}' is unknown; available: {', '.join(get_args(Backend))}"
+        )
+    if integrator not in get_args(Integrator):
+        raise ConfigError(
+            f"integrator '{integrator}' is unknown; available: {', '.join(get_args(Integrator))}"
+        )
+    if backend == "gym" and (model, integrator) != ("cartpole", "gym"):
+        raise ConfigError(
+            f"backend 'gym' is gymnasium's {GYM_ID} as it is: it takes no model or integrator "
+            f"(asked for '{model}', '{integrator}'); use backend 'mujoco' for these"
+        )
+
+
+def make_env(
+    backend: Backend, model: str = "cartpole", integrator: Integrator = "gym"
+) -> gymnasium.Env[Any, Any]:
+    """Make the environment of a backend, with the time limit of 500 steps.
+
+    Gymnasium's passive checker is left out: both environments pass it in the tests, and it costs
+    more than the physics.
+
+    Raises:
+        ConfigError: The backend is unknown or would ignore a setting.
+        ModelError: The model cannot be used.
+    """
+    check_backend(backend, model, integrator)
+    if backend == "gym":
+        return gymnasium.make(GYM_ID, disable_env_checker=True)
+    return gymnasium.make(ENV_ID, disable_env_checker=True, model=model, integrator=integrator)

@@ -1,0 +1,291 @@
+"""CartPole-v1 with MuJoCo underneath, as a `gymnasium.Env`."""
+
+import functools
+from typing import Any, ClassVar, Final, Literal, get_args
+
+import gymnasium
+import numpy as np
+import numpy.typing as npt
+from gymnasium import logger, spaces
+from gymnasium.envs.classic_control.utils import maybe_parse_reset_bounds
+
+from mjcartpole import task
+from mjcartpole.errors import ConfigError, InvalidActionError, ResetNeededError
+from mjcartpole.envs.registration import ENV_ID
+from mjcartpole.media.renderer import Renderer, open_renderer
+from mjcartpole.media.window import Window
+from mjcartpole.physics.model import ModelLike, load_model
+from mjcartpole.physics.simulation import (
+    LARGEST_SANE,
+    Integrator,
+    Simulation,
+    State,
+    check_sane,
+)
+
+RenderMode = Literal["human", "rgb_array"]
+
+# What `step` needs, as plain globals: the fewest look-ups.
+_ARRAY, _FLOAT32, _INT64 = np.array, np.float32, np.int64
+_X_LIMIT: Final = task.X_LIMIT
+_THETA_LIMIT: Final = task.THETA_LIMIT
+_SANE: Final = LARGEST_SANE
+
+_STEP_AFTER_END = (
+    "You are calling 'step()' even though this environment has already returned terminated = True. "
+    "You should always call 'reset()' once you receive 'terminated = True' -- any further steps are "
+    "undefined behavior."
+)
+
+
+class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], int]):
+    """CartPole-v1, moved by MuJoCo.
+
+    ## Description
+
+    A cart slides on a rail; a pole stands on it by a hinge that no motor turns. The pole starts
+    nearly upright, and the task is to keep it so by pushing the cart to the left or to the right.
+    Spaces, starting states, rewards and endings are those of gymnasium's `CartPole-v1`; the
+    motion comes from an MJCF model, and with the reference model one step differs from
+    gymnasium's by rounding alone.
+
+    >>> import gymnasium, mjcartpole
+    >>> env = gymnasium.make("mjcartpole/CartPole-v1")
+    >>> reference = gymnasium.make("CartPole-v1")
+    >>> observation, info = env.reset(seed=0)
+    >>> bool((observation == reference.reset(seed=0)[0]).all())
+    True
+    >>> env.step(1)[1:]
+    (1.0, False, False, {})
+
+    ## Action Space
+
+    `Discrete(2)`: 0 pushes the cart to the left (-x), 1 to the right (+x). An action drives the
+    actuator to one end of its control range; in the reference model that is a force of 10 N.
+
+    >>> env.action_space
+    Discrete(2)
+
+    ## Observation Space
+
+    A `float32` array of shape `(4,)`; the state itself is `float64`.
+
+    | Num | Observation           | Min                 | Max               |
+    |-----|-----------------------|---------------------|-------------------|
+    | 0   | Cart position         | -4.8 m              | 4.8 m             |
+    | 1   | Cart velocity         | -Inf                | Inf               |
+    | 2   | Pole angle            | ~ -0.418 rad (-24°) | ~ 0.418 rad (24°) |
+    | 3   | Pole angular velocity | -Inf                | Inf               |
+
+    A positive angle leans the pole to the right (+x). The bounds of positions are twice the
+    limits that end an episode, so the last observation lies inside.
+
+    >>> env.observation_space == reference.observation_space
+    True
+
+    ## Rewards
+
+    1 for every step, the terminating one included. With `sutton_barto_reward=True`: 0 for every
+    step and -1 for the terminating one.
+
+    ## Starting State
+
+    Each of the four values is drawn uniformly from (-0.05, 0.05) in the order x, x_dot, theta,
+    theta_dot; `reset(options={"low": ..., "high": ...})` draws from other bounds.
+
+    ## Episode End
+
+    1. Termination: the pole leans more than 12° (0.2094 rad).
+    2. Termination: the cart's centre is more than 2.4 m from the middle.
+    3. Truncation: 500 steps, by the time limit that `gymnasium.make` adds.
+
+    Limits are strict and compared with the float64 state. A step after termination warns once and
+    gives reward 0, as in CartPole-v1.
+
+    ## Arguments
+
+    | Parameter             | Type                   | Default     | Description                   |
+    |-----------------------|------------------------|-------------|-------------------------------|
+    | `model`               | str, path, MjSpec      | "cartpole"  | A shipped model's name, an MJCF file, an XML document, or an MjSpec |
+    | `integrator`          | "gym" or "mujoco"      | "gym"       | Explicit Euler as CartPole-v1, or the integrator that the file names |
+    | `sutton_barto_reward` | bool                   | False       | See Rewards                   |
+    | `render_mode`         | None, "rgb_array", "human" | None    | Nothing, arrays, or a window  |
+    | `width`, `height`     | int                    | 640, 480    | Size of a picture, in pixels  |
+    | `camera`              | str                    | "side"      | A camera of the model         |
+
+    `env.unwrapped.state` reads and sets the float64 state.
+
+    >>> env.unwrapped.state = (0.0, 0.0, 0.1, 0.0)
+    >>> [round(float(value), 4) for value in env.step(1)[0]]
+    [0.0, 0.1935, 0.1, -0.2605]
+    >>> env.close()
+
+    ## Version History
+
+    * v1: the rules of CartPole-v1.
+    """  # noqa: E501 - a table's rows cannot be wrapped
+
+    metadata: ClassVar[dict[str, Any]] = {
+        "render_modes": ["human", "rgb_array"],
+        "render_fps": round(1 / task.CONTROL_STEP),
+    }
+
+    def __init__(
+        self,
+        *,
+        model: ModelLike = "cartpole",
+        integrator: Integrator = "gym",
+        sutton_barto_reward: bool = False,
+        render_mode: RenderMode | None = None,
+        width: int = 640,
+        height: int = 480,
+        camera: str = "side",
+    ) -> None:
+        """Load the model; nothing is drawn and no OpenGL is touched until `render`.
+
+        Raises:
+            ModelError: The model cannot be found, has an error, or is no cart-pole.
+            ConfigError: The integrator or the render mode is unknown.
+        """
+        if render_mode is not None and render_mode not in get_args(RenderMode):
+            raise ConfigError(
+                f"render_mode {render_mode!r} is unknown; available: None, "
+                + ", ".join(repr(mode) for mode in get_args(RenderMode))
+            )
+        bound = task.observation_bound()
+        self.observation_space = spaces.Box(-bound, bound, dtype=np.float32)
+        self.action_space = spaces.Discrete(task.N_ACTIONS)
+        self.render_mode = render_mode
+        self.simulation = Simulation(load_model(model), integrator)
+        self._advance = _needs_reset
+        self._left, self._right = self.simulation.cartpole.controls
+        self._sutton_barto_reward = sutton_barto_reward
+        self._step_reward = task.reward(
+            terminated=False, already_over=False, sutton_barto=sutton_barto_reward
+        )
+        self._steps_after_end: int | None = None
+        self._open_renderer = functools.partial(
+            open_renderer, self.simulation.cartpole, width=width, height=height, camera=camera
+        )
+        self._renderer: Renderer | None = None
+        self._window: Window | None = None
+
+    @property
+    def state(self) -> npt.NDArray[np.float64] | None:
+        """The float64 state `(x, x_dot, theta, theta_dot)`, shape (4,); None before a reset."""
+        return None if self._advance is _needs_reset else self.simulation.state
+
+    @state.setter
+    def state(self, state: npt.ArrayLike) -> None:
+        self.simulation.set_state(state)
+        self._advance = self.simulation.step
+
+    def step(
+        self, action: int
+    ) -> tuple[npt.NDArray[np.float32], float, bool, bool, dict[str, Any]]:
+        """Advance 0.02 s.
+
+        Raises:
+            InvalidActionError: The action is not in the action space.
+            ResetNeededError: There is no state yet.
+            SimulationError: The physics diverged.
+        """
+        # The hot path: plain floats and no look-up that can be spared.
+        kind = action.__class__
+        if kind is not int and kind is not _INT64 and not self.action_space.contains(action):
+            raise _invalid(action)
+        if action == 1:
+            control = self._right
+        elif action == 0:
+            control = self._left
+        else:
+            raise _invalid(action)
+        x, x_dot, theta, theta_dot = self._advance(control)
+        if (
+            -_X_LIMIT <= x <= _X_LIMIT
+            and -_THETA_LIMIT <= theta <= _THETA_LIMIT
+            and -_SANE < x_dot < _SANE
+            and -_SANE < theta_dot < _SANE
+        ):
+            terminated, reward = False, self._step_reward
+        else:
+            terminated, reward = True, self._end((x, x_dot, theta, theta_dot))
+        if self.render_mode == "human":
+            self.render()
+        observation = _ARRAY((x, x_dot, theta, theta_dot), _FLOAT32)
+        return observation, reward, terminated, False, {}
+
+    def _end(self, state: State) -> float:
+        """Reward of a step that ends the episode, or comes after its end."""
+        check_sane(state, self.simulation.cartpole.name)
+        already_over = self._steps_after_end is not None
+        if self._steps_after_end == 0:
+            logger.warn(_STEP_AFTER_END)
+        self._steps_after_end = 0 if self._steps_after_end is None else self._steps_after_end + 1
+        return task.reward(
+            terminated=True, already_over=already_over, sutton_barto=self._sutton_barto_reward
+        )
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[npt.NDArray[np.float32], dict[str, Any]]:
+        """Start an episode.
+
+        Args:
+            seed: Seeds the env's generator, as gymnasium describes.
+            options: `{"low": float, "high": float}`, bounds of the starting state.
+
+        Raises:
+            ValueError: A bound is no number, or low is above high.
+        """
+        super().reset(seed=seed)
+        low, high = maybe_parse_reset_bounds(options, task.RESET_LOW, task.RESET_HIGH)
+        state = self.np_random.uniform(low=low, high=high, size=(4,))
+        self.state = state
+        self._steps_after_end = None
+        if self.render_mode == "human":
+            self.render()
+        return state.astype(np.float32), {}
+
+    def render(self) -> npt.NDArray[np.uint8] | None:  # type: ignore[override]
+        """Draw the current state.
+
+        Returns:
+            An array of shape (height, width, 3) in mode "rgb_array"; None in mode "human", which
+            shows a window, without a render mode, which warns, and before the first reset.
+
+        Raises:
+            RenderError: The camera or the size cannot be used, or there is no screen for a window.
+        """
+        if self.render_mode is None:
+            logger.warn(
+                "You are calling render method without specifying any render mode. "
+                f'Specify it when you make the env: gymnasium.make("{ENV_ID}", '
+                'render_mode="rgb_array")'
+            )
+            return None
+        if self.state is None:
+            return None
+        if self.render_mode == "human":
+            if self._window is None:
+                self._window = Window(self.simulation.cartpole)
+            self._window.show(self.state)
+            return None
+        if self._renderer is None:
+            self._renderer = self._open_renderer()
+        return self._renderer.render(self.state)
+
+    def close(self) -> None:
+        """Free the renderer and the window, if there are any."""
+        for picture in (self._renderer, self._window):
+            if picture is not None:
+                picture.close()
+        self._renderer = self._window = None
+
+
+def _needs_reset(control: float) -> State:
+    raise ResetNeededError("Call reset before using step method.")
+
+
+def _invalid(action: object) -> InvalidActionError:
+    return InvalidActionError(f"{action!r} ({type(action)}) invalid; the actions are 0 and 1")

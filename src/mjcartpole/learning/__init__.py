@@ -1,0 +1,1 @@
+"""Tabular control: a Q-table, how it learns, and what a training leaves behind."""

@@ -1,0 +1,24 @@
+"""Numbers that change as training goes on."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class LinearSchedule:
+    """A straight line from `start` to `end`, constant afterwards.
+
+    Attributes:
+        start: Value of episode 0.
+        end: Value from episode `episodes` on.
+        episodes: Length of the slope; 0 means `end` from the beginning.
+    """
+
+    start: float
+    end: float
+    episodes: float
+
+    def __call__(self, episode: int) -> float:
+        """Value in an episode, counted from 0."""
+        if episode >= self.episodes:
+            return self.end
+        return self.start + (self.end - self.start) * (episode / self.episodes)

@@ -1,0 +1,1 @@
+"""Pictures: frames with or without OpenGL, and frames into files."""

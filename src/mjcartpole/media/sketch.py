@@ -1,0 +1,3 @@
+from mjcartpole.media.scene import Scene
+class SketchRenderer:
+    def __init__(self, scene: Scene) -> None: ...

@@ -1,0 +1,102 @@
+"""How good is a policy? Greedy episodes, counted."""
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from mjcartpole.envs.backend import Backend, make_env
+from mjcartpole.errors import ConfigError
+from mjcartpole.learning.loop import ENDINGS, Episode, play_episode
+from mjcartpole.physics.simulation import Integrator
+
+EPISODES: Final = 100
+SEED: Final = 1_000_000
+"""Default seed of evaluations, far from the small ones that people train with."""
+
+PolicyLike = Callable[[npt.NDArray[np.float32]], int]
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """Greedy episodes of one policy.
+
+    Attributes:
+        backend: Who did the physics.
+        seed: Seed of the first episode's starting state.
+        episodes: What each came to.
+    """
+
+    backend: Backend
+    seed: int
+    episodes: tuple[Episode, ...]
+
+    @property
+    def returns(self) -> npt.NDArray[np.float64]:
+        """Return of each episode, shape (episodes,)."""
+        return np.array([episode.total for episode in self.episodes])
+
+    @property
+    def endings(self) -> dict[str, int]:
+        """How many episodes ended in each way."""
+        counts = Counter(episode.ending for episode in self.episodes)
+        return {ending: counts[ending] for ending in ENDINGS}
+
+    def summary(self) -> dict[str, Any]:
+        """The figures as plain values, for JSON."""
+        return {
+            "backend": self.backend,
+            "seed": self.seed,
+            "episodes": len(self.episodes),
+            "mean": float(self.returns.mean()),
+            "minimum": float(self.returns.min()),
+            "endings": self.endings,
+        }
+
+
+def evaluate(
+    policy: PolicyLike,
+    *,
+    backend: Backend = "mujoco",
+    model: str = "cartpole",
+    integrator: Integrator = "gym",
+    episodes: int = EPISODES,
+    seed: int = SEED,
+) -> Evaluation:
+    """Play episodes from fresh starting states, without learning.
+
+    Args:
+        policy: From an observation to an action.
+        backend: Who does the physics.
+        model: Name or path of the model, for backend mujoco.
+        integrator: See `Simulation`.
+        episodes: How many to play, at least 1.
+        seed: Seeds the starting states.
+
+    Raises:
+        ConfigError: A setting makes no sense.
+        ModelError: The model cannot be used.
+    """
+    check_count(episodes, seed)
+    env = make_env(backend, model, integrator)
+    played = tuple(
+        play_episode(env, policy, index=index, seed=seed if index == 0 else None)[0]
+        for index in range(episodes)
+    )
+    env.close()
+    return Evaluation(backend, seed, played)
+
+
+def check_count(episodes: int, seed: int) -> None:
+    """Refuse numbers of episodes below 1 and seeds below 0.
+
+    Raises:
+        ConfigError: See above.
+    """
+    if episodes < 1:
+        raise ConfigError(f"episodes must be a whole number from 1 up, not {episodes}")
+    if seed < 0:
+        raise ConfigError(f"seed must be a whole number from 0 up, not {seed}")
