@@ -18,8 +18,9 @@ from mjcartpole.envs.registration import ENV_ID, register
 
 if TYPE_CHECKING:
     from mjcartpole.envs.cartpole import CartPoleEnv
+    from mjcartpole.learning.config import TrainConfig
     from mjcartpole.learning.policy import Policy
-    from mjcartpole.learning.training import TrainConfig, TrainResult, train
+    from mjcartpole.learning.training import TrainResult, train
     from mjcartpole.physics.model import CartPole, load_model, model_names
     from mjcartpole.physics.simulation import Simulation
     from mjcartpole.studies.evaluation import Evaluation, evaluate
@@ -47,7 +48,7 @@ _HOMES = {
     "Evaluation": "studies.evaluation",
     "Policy": "learning.policy",
     "Simulation": "physics.simulation",
-    "TrainConfig": "learning.training",
+    "TrainConfig": "learning.config",
     "TrainResult": "learning.training",
     "evaluate": "studies.evaluation",
     "load_model": "physics.model",

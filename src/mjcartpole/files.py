@@ -56,6 +56,15 @@ def make_folder(path: str | os.PathLike[str]) -> Path:
     return folder
 
 
+def check_writable(folder: Path) -> None:
+    """Refuse a folder in which no file can be made, before any work is put into one.
+
+    Raises:
+        FileError: See above.
+    """
+    _make_temporary(folder / "probe").unlink()
+
+
 def _make_temporary(target: Path) -> Path:
     make_folder(target.parent)
     if target.is_dir():

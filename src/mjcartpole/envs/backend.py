@@ -6,7 +6,7 @@ import gymnasium
 
 from mjcartpole.envs.registration import ENV_ID
 from mjcartpole.errors import ConfigError
-from mjcartpole.physics.simulation import Integrator
+from mjcartpole.physics.integrator import Integrator, check_integrator
 
 Backend = Literal["mujoco", "gym"]
 
@@ -23,10 +23,7 @@ def check_backend(backend: str, model: str, integrator: str) -> None:
         raise ConfigError(
             f"backend '{backend}' is unknown; available: {', '.join(get_args(Backend))}"
         )
-    if integrator not in get_args(Integrator):
-        raise ConfigError(
-            f"integrator '{integrator}' is unknown; available: {', '.join(get_args(Integrator))}"
-        )
+    check_integrator(integrator)
     if backend == "gym" and (model, integrator) != ("cartpole", "gym"):
         raise ConfigError(
             f"backend 'gym' is gymnasium's {GYM_ID} as it is: it takes no model or integrator "

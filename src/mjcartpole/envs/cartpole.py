@@ -14,10 +14,10 @@ from mjcartpole.errors import ConfigError, InvalidActionError, ResetNeededError
 from mjcartpole.envs.registration import ENV_ID
 from mjcartpole.media.renderer import Renderer, open_renderer
 from mjcartpole.media.window import Window
+from mjcartpole.physics.integrator import Integrator
 from mjcartpole.physics.model import ModelLike, load_model
 from mjcartpole.physics.simulation import (
     LARGEST_SANE,
-    Integrator,
     Simulation,
     State,
     check_sane,
@@ -177,7 +177,7 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], int]):
 
     @state.setter
     def state(self, state: npt.ArrayLike) -> None:
-        self.simulation.set_state(state)
+        self.simulation.state = state
         self._advance = self.simulation.step
 
     def step(

@@ -18,6 +18,7 @@ import os
 import subprocess
 import sys
 import weakref
+from types import ModuleType
 from typing import Final, Literal, Protocol, get_args
 
 from mjcartpole.errors import RenderError
@@ -72,9 +73,7 @@ class Context:
         if self.backend == "egl":
             egl = self._module.EGL
             display = self._module.EGL_DISPLAY
-            egl.eglMakeCurrent(
-                display, egl.EGL_NO_SURFACE, egl.EGL_NO_SURFACE, egl.EGL_NO_CONTEXT
-            )
+            egl.eglMakeCurrent(display, egl.EGL_NO_SURFACE, egl.EGL_NO_SURFACE, egl.EGL_NO_CONTEXT)
         elif self.backend == "osmesa":
             self._module.osmesa.OSMesaMakeCurrent(None, None, self._module.GL.GL_FLOAT, 0, 0)
         elif hasattr(self._module, "glfw"):
@@ -212,7 +211,7 @@ def _module_name(backend: Backend) -> str:
     return "cgl" if backend == "glfw" and sys.platform == "darwin" else backend
 
 
-def _import_backend(backend: Backend):  # noqa: ANN202
+def _import_backend(backend: Backend) -> ModuleType:
     """Import MuJoCo's module for a backend without leaving a trace in the environment.
 
     The module sets PYOPENGL_PLATFORM, which processes started later would inherit; one that

@@ -1,3 +1,152 @@
+"""Frames without OpenGL: MuJoCo's geoms as shaded polygons, drawn by Pillow.
+
+Each geom becomes a few flat polygons in pixels (`outlines.py`), drawn from the farthest to the
+nearest. Only the box around what moves is drawn again for each frame, at several times the size
+and then reduced, which smooths the edges; the rest comes from a picture made once.
+"""
+
+import math
+from types import TracebackType
+from typing import Final, Self
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+from PIL import Image, ImageDraw
+
+from mjcartpole.errors import RenderError
+from mjcartpole.media.outlines import Outline, View, outline_of
 from mjcartpole.media.scene import Scene
+
+_OVERSAMPLING: Final = 4
+_BLACK: Final = (0, 0, 0)
+
+Box = tuple[int, int, int, int]
+"""Left, top, right, bottom, in pixels; right and bottom lie just outside."""
+
+
 class SketchRenderer:
-    def __init__(self, scene: Scene) -> None: ...
+    """Draws any cart-pole on any machine.
+
+    It knows boxes, capsules, cylinders, spheres, ellipsoids, planes and (by their outline)
+    meshes, the model's cameras, colours and lights; no shadows, reflections or textures.
+
+    Attributes:
+        kind: `"sketch"`.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self.kind = "sketch"
+        self._scene: Scene | None = scene
+        self._still = scene.is_camera_still
+        self._view: View | None = None
+        self._static: dict[int, Outline] = {}
+        self._background: npt.NDArray[np.uint8] | None = None
+        self._backdrop = _backdrop(scene.model)
+
+    def render(self, state: npt.ArrayLike) -> npt.NDArray[np.uint8]:
+        """Draw a state `(x, x_dot, theta, theta_dot)`; m, m/s, rad, rad/s.
+
+        Returns:
+            A new array of shape (height, width, 3), red, green, blue.
+
+        Raises:
+            RenderError: The renderer is closed, or it is no state.
+        """
+        scene = self._scene
+        if scene is None:
+            raise RenderError("the renderer is closed; open another one")
+        scene.show(state)
+        if self._view is None or not self._still:
+            self._view = View.of(scene)
+        whole = (0, 0, scene.width, scene.height)
+        if self._background is None:
+            self._static = self._outline_static(scene, self._view)
+            self._background = self._draw(list(self._static.values()), whole)
+        moving = self._outline_moving(scene, self._view)
+        frame = self._background.copy()
+        box = _bounds(moving, whole)
+        if box is not None:
+            left, top, right, bottom = box
+            outlines = [*self._static.values(), *moving]
+            frame[top:bottom, left:right] = self._draw(outlines, box)
+        return frame
+
+    def _outline_static(self, scene: Scene, view: View) -> dict[int, Outline]:
+        """Outlines, by place in the scene, of geoms that look the same in every frame."""
+        if not self._still:
+            return {}
+        model, geoms = scene.model, scene.abstract.geoms
+        static = {}
+        for index in range(scene.abstract.ngeom):
+            geom = geoms[index]
+            is_geom = geom.objtype == mujoco.mjtObj.mjOBJ_GEOM and geom.objid >= 0
+            if is_geom and model.body_weldid[model.geom_bodyid[geom.objid]] == 0:
+                static[index] = outline_of(geom, scene, view)
+        return static
+
+    def _outline_moving(self, scene: Scene, view: View) -> list[Outline]:
+        geoms, static = scene.abstract.geoms, self._static
+        indices = range(scene.abstract.ngeom)
+        return [outline_of(geoms[index], scene, view) for index in indices if index not in static]
+
+    def _draw(self, outlines: list[Outline], box: Box) -> npt.NDArray[np.uint8]:
+        """Draw what lies in a box of the picture; shape (bottom - top, right - left, 3)."""
+        left, top, right, bottom = box
+        size = ((right - left) * _OVERSAMPLING, (bottom - top) * _OVERSAMPLING)
+        canvas = Image.new("RGB", size, self._backdrop)
+        pen = ImageDraw.Draw(canvas, "RGBA")
+        for outline in sorted(outlines, key=lambda outline: outline.order):
+            if not _meet(outline.bounds, box):
+                continue
+            for colour, points in outline.polygons:
+                # Pillow counts from the centre of a pixel, the view from its corner.
+                corners = (points - (left, top)) * _OVERSAMPLING - 0.5
+                pen.polygon(corners.ravel().tolist(), fill=colour)
+        return np.asarray(canvas.reduce(_OVERSAMPLING))
+
+    def close(self) -> None:
+        """Let go of the scene; a second call does nothing."""
+        self._scene = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
+
+
+def _bounds(outlines: list[Outline], whole: Box) -> Box | None:
+    """The box around outlines, cut to the picture; None if nothing lies in it."""
+    boxes = [outline.bounds for outline in outlines if outline.polygons]
+    if not boxes:
+        return None
+    left = max(whole[0], math.floor(min(box[0] for box in boxes)) - 1)
+    top = max(whole[1], math.floor(min(box[1] for box in boxes)) - 1)
+    right = min(whole[2], math.ceil(max(box[2] for box in boxes)) + 1)
+    bottom = min(whole[3], math.ceil(max(box[3] for box in boxes)) + 1)
+    return (left, top, right, bottom) if left < right and top < bottom else None
+
+
+def _meet(bounds: tuple[float, float, float, float], box: Box) -> bool:
+    left, top, right, bottom = bounds
+    return left < box[2] and right > box[0] and top < box[3] and bottom > box[1]
+
+
+def _backdrop(model: mujoco.MjModel) -> tuple[int, int, int]:
+    """What is seen past all geoms: the mean colour of the sky, or black, as OpenGL shows it."""
+    skies = np.flatnonzero(model.tex_type == int(mujoco.mjtTexture.mjTEXTURE_SKYBOX))
+    if not len(skies):
+        return _BLACK
+    sky = skies[0]
+    channels = int(model.tex_nchannel[sky])
+    start = int(model.tex_adr[sky])
+    amount = int(model.tex_width[sky]) * int(model.tex_height[sky]) * channels
+    pixels = model.tex_data[start : start + amount].reshape(-1, channels)
+    red, green, blue = (int(value) for value in pixels[:, :3].mean(axis=0))
+    return red, green, blue

@@ -145,7 +145,7 @@ def _ffmpeg() -> str:
     from imageio.plugins import ffmpeg  # noqa: PLC0415
 
     try:
-        return str(ffmpeg.get_exe())
+        return str(ffmpeg.get_exe())  # type: ignore[no-untyped-call]
     except RuntimeError as error:
         raise RenderError(f"no ffmpeg was found: {error}; pip install 'imageio[ffmpeg]'") from error
 

@@ -11,6 +11,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import mujoco
+import numpy as np
 
 from mjcartpole import task
 from mjcartpole.errors import ModelNotFoundError, ModelSyntaxError, NotACartPoleError
@@ -138,16 +139,33 @@ def _one_line(error: Exception) -> str:
     return message.removeprefix("XML Error: ").removeprefix("Error: ")
 
 
+def same_model(a: mujoco.MjModel, b: mujoco.MjModel) -> bool:
+    """Whether two compiled models are equal in every number, name and option."""
+    return _bytes_of(a) == _bytes_of(b)
+
+
+def _bytes_of(model: mujoco.MjModel) -> bytes:
+    buffer = np.empty(mujoco.mj_sizeModel(model), dtype=np.uint8)
+    mujoco.mj_saveModel(model, None, buffer)
+    return buffer.tobytes()
+
+
 def self_contained(text: str, folder: Path) -> str:
     """The document with the content of its `<include>` files in their place.
 
     A document without includes is returned as it is, to the last character.
+
+    Raises:
+        ModelSyntaxError: MuJoCo is lenient, but with includes the files must be well-formed XML.
     """
     if "<include" not in text:
         return text
     parser = ElementTree.XMLParser(target=ElementTree.TreeBuilder(insert_comments=True))
-    root = ElementTree.fromstring(text, parser)
-    _expand_includes(root, folder)
+    try:
+        root = ElementTree.fromstring(text, parser)
+        _expand_includes(root, folder)
+    except (ElementTree.ParseError, OSError) as error:
+        raise ModelSyntaxError(f"the includes cannot be put together: {error}") from error
     return ElementTree.tostring(root, encoding="unicode")
 
 
@@ -224,9 +242,10 @@ def _substeps(name: str, model: mujoco.MjModel) -> int:
 
 
 def _no_cart_pole(name: str, model: mujoco.MjModel, found: str) -> NotACartPoleError:
-    kinds = [mujoco.mjtJoint(int(kind)).name.removeprefix("mjJNT_").lower() for kind in model.jnt_type]
+    kinds = [mujoco.mjtJoint(int(kind)).name for kind in model.jnt_type]
     joints = [
-        f"{model.joint(index).name or 'unnamed'} ({kind})" for index, kind in enumerate(kinds)
+        f"{model.joint(index).name or 'unnamed'} ({kind.removeprefix('mjJNT_').lower()})"
+        for index, kind in enumerate(kinds)
     ]
     actuators = [model.actuator(index).name or "unnamed" for index in range(model.nu)]
     return NotACartPoleError(

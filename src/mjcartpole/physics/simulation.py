@@ -1,17 +1,14 @@
 """State in, control in, state out: a cart-pole moved by MuJoCo, one control step at a time."""
 
 from collections.abc import Callable
-from typing import Literal, get_args
 
 import mujoco
 import numpy as np
 import numpy.typing as npt
 
 from mjcartpole.errors import ConfigError, SimulationError
+from mjcartpole.physics.integrator import Integrator, check_integrator
 from mjcartpole.physics.model import CartPole
-
-Integrator = Literal["gym", "mujoco"]
-"""Who moves the state: explicit Euler as CartPole-v1 does, or the file's own integrator."""
 
 State = tuple[float, float, float, float]
 """`(x, x_dot, theta, theta_dot)`: m, m/s, rad, rad/s."""
@@ -40,10 +37,7 @@ class Simulation:
         Raises:
             ConfigError: The integrator is unknown.
         """
-        if integrator not in get_args(Integrator):
-            raise ConfigError(
-                f"integrator {integrator!r} is unknown; available: {', '.join(get_args(Integrator))}"
-            )
+        check_integrator(integrator)
         self.cartpole = cartpole
         self.integrator = integrator
         self._model = _stepping_model(cartpole.model, integrator)
@@ -57,8 +51,9 @@ class Simulation:
         slider, hinge = self.cartpole.slider, self.cartpole.hinge
         return np.array([qpos[slider], qvel[slider], qpos[hinge], qvel[hinge]])
 
-    def set_state(self, state: npt.ArrayLike) -> None:
-        """Put the cart-pole into a state `(x, x_dot, theta, theta_dot)`; nothing of its past remains.
+    @state.setter
+    def state(self, state: npt.ArrayLike) -> None:
+        """Put the cart-pole into a state, shape (4,); nothing of its past remains.
 
         Raises:
             ConfigError: The state has not four values.
@@ -143,6 +138,6 @@ def check_sane(state: State, model_name: str) -> None:
     """
     if not all(-LARGEST_SANE < value < LARGEST_SANE for value in state):
         raise SimulationError(
-            f"the simulation of {model_name} diverged: state (x, x_dot, theta, theta_dot) = {state}; "
+            f"the simulation of {model_name} diverged: (x, x_dot, theta, theta_dot) = {state}; "
             "look for tiny masses, huge forces or a long timestep in the model"
         )

@@ -1,0 +1,120 @@
+"""How reliable is a learner? Every figure of docs/learning.md comes from here.
+
+    python benchmarks/learners.py presets --seeds 20 --backends mujoco gym
+    python benchmarks/learners.py variants --seeds 20
+
+Each seed is trained alone, then its greedy policy plays 100 episodes from fresh starting states.
+`last 2000` is the mean return over the last 2,000 training episodes (all, if there are fewer).
+Seeds start at --first-seed, so that settings chosen on some seeds can be confirmed on others.
+"""
+
+import argparse
+import json
+import multiprocessing
+import os
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mjcartpole.learning.config import PRESETS, TrainConfig
+from mjcartpole.learning.training import train
+from mjcartpole.studies.evaluation import evaluate
+
+# What was tried around `tuned`: each entry changes its defaults.
+VARIANTS: dict[str, dict[str, Any]] = {
+    "tuned": {},
+    "1,000 episodes": {"episodes": 1_000},
+    "500 episodes": {"episodes": 500},
+    "random ties": {"ties": "random"},
+    "table from 0": {"q_init_low": 0.0, "q_init_high": 0.0},
+    "table from 50 (never disappointed)": {"q_init_low": 50.0, "q_init_high": 50.0},
+    "constant alpha 0.1": {"alpha": 0.1, "alpha_final": 0.1},
+    "epsilon 0.1 from the start": {"epsilon": 0.1},
+    "gamma 0.95": {"gamma": 0.95},
+    "gamma 0.99": {"gamma": 0.99},
+    "bins 1,1,6,12": {"bins": (1, 1, 6, 12)},
+    "bins 3,3,6,8": {"bins": (3, 3, 6, 8)},
+    "bins 1,3,4,8": {"bins": (1, 3, 4, 8)},
+    "last step not learned": {"learn_last_step": False},
+}
+
+Job = tuple[str, TrainConfig]
+
+
+def measure(job: Job) -> dict[str, Any]:
+    """Train and evaluate one seed."""
+    name, config = job
+    started = time.process_time()
+    result = train(config)
+    seconds = time.process_time() - started
+    evaluation = evaluate(result.policy, backend=config.backend, model=config.model)
+    return {
+        "name": name,
+        "backend": config.backend,
+        "seed": config.seed,
+        "last_2000": float(result.returns[-2_000:].mean()),
+        "greedy_mean": float(evaluation.returns.mean()),
+        "greedy_min": float(evaluation.returns.min()),
+        "endings": evaluation.endings,
+        "steps": result.steps,
+        "cpu_seconds": seconds,
+    }
+
+
+def make_jobs(options: argparse.Namespace) -> list[Job]:
+    """All trainings that were asked for."""
+    table = PRESETS if options.what == "presets" else VARIANTS
+    names = options.names or list(table)
+    seeds = range(options.first_seed, options.first_seed + options.seeds)
+    return [
+        (name, TrainConfig(**{**table[name], "backend": backend, "seed": seed}))
+        for name in names
+        for backend in options.backends
+        for seed in seeds
+    ]
+
+
+def print_group(name: str, backend: str, rows: list[dict[str, Any]]) -> None:
+    """One line of the table."""
+    last = np.array([row["last_2000"] for row in rows])
+    greedy = np.array([row["greedy_mean"] for row in rows])
+    print(
+        f"{name:36s} {backend:7s} {len(rows):5d} "
+        f"{last.mean():7.1f} ±{last.std(ddof=min(1, len(rows) - 1)):6.1f} {np.median(last):7.1f} "
+        f"{greedy.mean():7.1f} {greedy.min():7.1f} "
+        f"{(greedy >= 490).mean():6.0%} {(greedy == 500).mean():6.0%} "
+        f"{np.median([row['cpu_seconds'] for row in rows]):7.1f}",
+        flush=True,
+    )
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("what", choices=["presets", "variants"])
+    parser.add_argument("--names", nargs="*", help="only these")
+    parser.add_argument("--backends", nargs="*", default=["mujoco"], choices=["mujoco", "gym"])
+    parser.add_argument("--seeds", type=int, default=20)
+    parser.add_argument("--first-seed", type=int, default=1_000)
+    parser.add_argument("--workers", type=int, default=os.cpu_count())
+    parser.add_argument("--json", type=Path, help="write every seed's figures here")
+    options = parser.parse_args()
+    print(
+        f"{'':36s} {'backend':7s} {'seeds':>5s} {'last 2000':>16s} {'median':>7s} "
+        f"{'greedy':>7s} {'worst':>7s} {'>=490':>6s} {'=500':>6s} {'CPU s':>7s}"
+    )
+    rows: list[dict[str, Any]] = []
+    with multiprocessing.Pool(options.workers) as pool:
+        for row in pool.imap(measure, make_jobs(options)):
+            rows.append(row)
+            group = [r for r in rows if (r["name"], r["backend"]) == (row["name"], row["backend"])]
+            if len(group) == options.seeds:
+                print_group(row["name"], row["backend"], group)
+    if options.json:
+        options.json.write_text(json.dumps(rows, indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    main()

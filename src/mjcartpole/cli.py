@@ -1,0 +1,193 @@
+"""The command line: parse, call, print.
+
+Results go to stdout, progress and errors to stderr. Exit codes: 0, 2 for a user's mistake, 130
+after Ctrl-C. Heavy modules are imported by the command that needs them, so `--help` is quick.
+"""
+
+import contextlib
+import io
+import os
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, NoReturn
+
+import tyro
+
+from mjcartpole import __version__
+from mjcartpole.envs.backend import Backend
+from mjcartpole.errors import MjCartPoleError
+from mjcartpole.learning.config import TrainConfig
+from mjcartpole.physics.integrator import Integrator
+
+INTERRUPTED = 130
+
+
+@dataclass(frozen=True)
+class Train:
+    """Train a Q-table, evaluate it, and film it."""
+
+    config: Annotated[TrainConfig, tyro.conf.arg(name=""), tyro.conf.OmitArgPrefixes]
+    preset: str = "tuned"
+    """Where the defaults below come from: tuned, article or article-terminal."""
+    run_dir: Path | None = None
+    """Folder for the run; runs/<preset>-<backend>-seed<seed> if left out."""
+    video: bool = True
+    """Film the first evaluation episode into videos/<run's name>.mp4."""
+    overwrite: bool = False
+    """Replace the run that --run-dir holds."""
+
+
+@dataclass(frozen=True)
+class Evaluate:
+    """Play greedy episodes from fresh starting states, and count."""
+
+    source: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="RUN-OR-POLICY")]
+    """A run folder or a policy file."""
+    backend: Backend | None = None
+    """Who does the physics; the run's own if left out."""
+    model: str | None = None
+    """Model to play on; the run's own if left out."""
+    integrator: Integrator | None = None
+    """The run's own if left out."""
+    episodes: int = 100
+    """How many."""
+    seed: int | None = None
+    """Seeds the starting states; the same as after training if left out."""
+    json: bool = False
+    """Print JSON."""
+
+
+@dataclass(frozen=True)
+class Render:
+    """Film one greedy episode."""
+
+    source: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="RUN-OR-POLICY")]
+    """A run folder or a policy file."""
+    output: Annotated[Path | None, tyro.conf.arg(aliases=["-o"])] = None
+    """The video, .mp4 or .gif; videos/<name>.mp4 if left out."""
+    backend: Backend | None = None
+    """Who does the physics; the run's own if left out."""
+    model: str | None = None
+    """Model to play on, and to draw; the run's own if left out."""
+    integrator: Integrator | None = None
+    """The run's own if left out."""
+    seed: int | None = None
+    """Seeds the starting state; the first evaluation episode's if left out."""
+    camera: str = "side"
+    """A camera of the model."""
+    width: int = 640
+    """Pixels."""
+    height: int = 480
+    """Pixels."""
+
+
+Command = Train | Evaluate | Render
+
+
+class UsageError(MjCartPoleError):
+    """The command line cannot be understood."""
+
+
+def main(argv: Sequence[str] | None = None) -> NoReturn:
+    """Run a command and exit with its code."""
+    try:
+        code = _run(list(sys.argv[1:] if argv is None else argv))
+    except MjCartPoleError as error:
+        print(f"mjcartpole: error: {error}", file=sys.stderr)
+        code = 2
+    except KeyboardInterrupt:
+        print("mjcartpole: interrupted", file=sys.stderr)
+        code = INTERRUPTED
+    except BrokenPipeError:
+        # The reader of stdout has gone (`mjcartpole … | head`): nothing is left to say.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        code = 0
+    sys.exit(code)
+
+
+def _run(argv: list[str]) -> int:
+    if argv in (["--version"], ["-V"]):
+        print(f"mjcartpole {__version__}")
+        return 0
+    command = parse(argv or ["--help"])
+    from mjcartpole import commands  # noqa: PLC0415 - it imports MuJoCo
+
+    match command:
+        case Train():
+            return commands.run_train(
+                command.config,
+                preset=command.preset,
+                run_dir=command.run_dir,
+                video=command.video,
+                overwrite=command.overwrite,
+            )
+        case Evaluate():
+            return commands.run_evaluate(
+                command.source,
+                commands.Choice(command.backend, command.model, command.integrator, command.seed),
+                episodes=command.episodes,
+                as_json=command.json,
+            )
+        case Render():
+            return commands.run_render(
+                command.source,
+                commands.Choice(command.backend, command.model, command.integrator, command.seed),
+                output=command.output,
+                camera=command.camera,
+                width=command.width,
+                height=command.height,
+            )
+
+
+def parse(argv: Sequence[str]) -> Command:
+    """The command that a command line means.
+
+    Raises:
+        ConfigError: A value makes no sense.
+        UsageError: A word of it is not understood.
+        SystemExit: With code 0, after `--help`.
+    """
+    preset = _preset_in(argv)
+    train_default = Train(config=TrainConfig.preset(preset), preset=preset)
+    grammar = (
+        Annotated[Train, tyro.conf.subcommand("train", default=train_default)]
+        | Annotated[Evaluate, tyro.conf.subcommand("evaluate")]
+        | Annotated[Render, tyro.conf.subcommand("render")]
+    )
+    complaint = io.StringIO()
+    try:
+        with contextlib.redirect_stderr(complaint):
+            command: Command = tyro.cli(
+                grammar,  # type: ignore[arg-type]
+                args=list(argv),
+                prog="mjcartpole",
+                description="CartPole-v1 as real physics: train a Q-table, evaluate it, film it.",
+            )
+    except SystemExit as stop:
+        if not stop.code:
+            raise
+        raise UsageError(_one_line(complaint.getvalue())) from None
+    return command
+
+
+def _preset_in(argv: Sequence[str]) -> str:
+    """The preset that a command line names: it decides the other flags' defaults."""
+    for word, following in zip(argv, [*argv[1:], ""], strict=True):
+        if word == "--preset":
+            return following
+        if word.startswith("--preset="):
+            return word.removeprefix("--preset=")
+    return "tuned"
+
+
+def _one_line(complaint: str) -> str:
+    """A tyro error box as one line: its message, and what it thinks was meant."""
+    lines = [line.strip("│╭╮╰╯─ \n") for line in complaint.splitlines()[1:]]
+    blocks = [block.split("\n") for block in "\n".join(lines).split("\n\n")]
+    message = " ".join(line for line in blocks[0] if line)
+    for block in blocks[1:]:
+        if block[0].startswith("Perhaps you meant") and len(block) > 1:
+            message += f"; perhaps you meant {block[1]}"
+    return f"{message}; see mjcartpole --help"

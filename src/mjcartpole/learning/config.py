@@ -1,0 +1,138 @@
+"""All that decides a training: `TrainConfig` and its presets.
+
+One place for each number: the command line's flags and their help are derived from this class.
+"""
+
+import dataclasses
+import math
+from dataclasses import dataclass
+from typing import Any, Final, get_args
+
+from mjcartpole import task
+from mjcartpole.envs.backend import Backend, check_backend
+from mjcartpole.errors import ConfigError
+from mjcartpole.learning.discretizer import Discretizer
+from mjcartpole.learning.qlearning import Ties
+from mjcartpole.physics.integrator import Integrator
+
+# The article's ranges, as its code has them: the float32 bound of the angle, and 3.5 rad/s.
+_ARTICLE_THETA = float(task.observation_bound()[2])
+_ARTICLE: dict[str, Any] = {
+    "episodes": 12_000,
+    "bins": (1, 1, 25, 25),
+    "low": (-2.4, -1.0, -_ARTICLE_THETA, -3.5),
+    "high": (2.4, 1.0, _ARTICLE_THETA, 3.5),
+    "gamma": 0.95,
+    "alpha": 0.1,
+    "alpha_final": 0.1,
+    "epsilon": 0.1,
+    "epsilon_final": 0.0,
+    "q_init_low": 0.0,
+    "q_init_high": 1.0,
+    "ties": "first",
+    "learn_last_step": False,
+    "log_every": 2_000,
+}
+PRESETS: Final[dict[str, dict[str, Any]]] = {
+    "tuned": {},
+    "article": _ARTICLE,
+    "article-terminal": {**_ARTICLE, "learn_last_step": True},
+}
+"""What each preset changes in the defaults of `TrainConfig`, which are those of `tuned`."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrainConfig:
+    """All that decides a training. Equal configs give equal tables, bit for bit."""
+
+    backend: Backend = "mujoco"
+    """Who does the physics: mujoco, or gymnasium's own CartPole-v1."""
+    model: str = "cartpole"
+    """A shipped model's name or an MJCF file; backend mujoco only."""
+    integrator: Integrator = "gym"
+    """gym: explicit Euler, as CartPole-v1; mujoco: the integrator that the model's file names."""
+    episodes: int = 2_000
+    """Episodes to train."""
+    seed: int = 0
+    """Seeds the environment and the learner."""
+    bins: tuple[int, ...] = (1, 3, 6, 8)
+    """Bins for x, x_dot, theta and theta_dot; 1 ignores a dimension."""
+    low: tuple[float, ...] = (-2.4, -1.0, -0.2095, -1.5)
+    """Lower ends of the bins' ranges; what lies outside belongs to the edge bins."""
+    high: tuple[float, ...] = (2.4, 1.0, 0.2095, 1.5)
+    """Upper ends of the bins' ranges."""
+    gamma: float = 0.98
+    """Discount per step."""
+    alpha: float = 0.3
+    """Step size at the start."""
+    alpha_final: float = 0.01
+    """Step size once decayed."""
+    epsilon: float = 1.0
+    """Probability of a random action at the start."""
+    epsilon_final: float = 0.01
+    """Probability of a random action once decayed."""
+    decay: float = 0.5
+    """Share of the episodes over which alpha and epsilon fall, linearly."""
+    q_init_low: float = 10.0
+    """The table starts uniformly random between this …"""
+    q_init_high: float = 10.0
+    """… and this."""
+    ties: Ties = "first"
+    """Between equal values: the first action, or a random one."""
+    learn_last_step: bool = True
+    """Learn from the step that ends an episode (the article's code does not)."""
+    log_every: int = 200
+    """Episodes per row of the printed table."""
+
+    def __post_init__(self) -> None:
+        check_backend(self.backend, self.model, self.integrator)
+        self._check_counts()
+        self._check_numbers()
+        if len(self.bins) != len(("x", "x_dot", "theta", "theta_dot")):
+            raise ConfigError(f"bins needs 4 values (x, x_dot, theta, theta_dot), not {self.bins}")
+        if self.ties not in get_args(Ties):
+            raise ConfigError(f"ties must be 'first' or 'random', not {self.ties!r}")
+        _ = self.discretizer
+
+    @classmethod
+    def preset(cls, name: str, **changes: Any) -> "TrainConfig":  # noqa: ANN401
+        """A preset's config with some fields changed.
+
+        Args:
+            name: `tuned`, `article` or `article-terminal`.
+            changes: Any field of the config.
+
+        Raises:
+            ConfigError: The preset or a field is unknown, or a value makes no sense.
+        """
+        if name not in PRESETS:
+            raise ConfigError(f"preset '{name}' is unknown; available: {', '.join(PRESETS)}")
+        known = [field.name for field in dataclasses.fields(cls)]
+        unknown = sorted(set(changes) - set(known))
+        if unknown:
+            raise ConfigError(
+                f"TrainConfig has no field {', '.join(unknown)}; available: {', '.join(known)}"
+            )
+        return cls(**{**PRESETS[name], **changes})
+
+    @property
+    def discretizer(self) -> Discretizer:
+        """The grid that the config describes."""
+        return Discretizer(tuple(self.bins), tuple(self.low), tuple(self.high))
+
+    def _check_counts(self) -> None:
+        for name, least in (("episodes", 1), ("log_every", 1), ("seed", 0)):
+            value = getattr(self, name)
+            if not isinstance(value, int) or value < least:
+                raise ConfigError(f"{name} must be a whole number from {least} up, not {value!r}")
+
+    def _check_numbers(self) -> None:
+        for name in ("gamma", "alpha", "alpha_final", "epsilon", "epsilon_final", "decay"):
+            value = getattr(self, name)
+            if not 0 <= value <= 1:
+                raise ConfigError(f"{name} must lie between 0 and 1, not {value!r}")
+        start, end = self.q_init_low, self.q_init_high
+        if not (math.isfinite(start) and math.isfinite(end) and start <= end):
+            raise ConfigError(
+                f"q_init_low and q_init_high must be finite and in order, not {start} and {end}"
+            )

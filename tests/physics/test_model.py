@@ -1,0 +1,170 @@
+"""Models are found, checked and understood, or refused with the reason."""
+
+import re
+from xml.etree import ElementTree
+
+import mujoco
+import pytest
+
+from mjcartpole.errors import ModelNotFoundError, ModelSyntaxError, NotACartPoleError
+from mjcartpole.physics.model import (
+    load_model,
+    model_names,
+    models_folder,
+    same_model,
+    self_contained,
+)
+
+REFERENCE = (models_folder() / "cartpole.xml").read_text(encoding="utf-8")
+
+
+def changed(pattern, replacement):
+    """The reference document with one change."""
+    text, count = re.subn(pattern, replacement, REFERENCE, count=1, flags=re.DOTALL)
+    assert count == 1
+    return text
+
+
+def test_the_reference_is_cartpole_v1_to_the_last_digit():
+    model = load_model("cartpole").model
+    cart, pole = model.body("cart"), model.body("pole")
+    assert (cart.mass[0], pole.mass[0]) == (1.0, 0.1)
+    assert pole.ipos.tolist() == [0.0, 0.0, 0.5]
+    assert pole.inertia[1] == 0.1 * 1.0**2 / 12
+    assert model.opt.gravity.tolist() == [0.0, 0.0, -9.8]
+    assert model.opt.timestep == 0.02
+    assert model.body_mass.sum() == 1.1
+    assert model.actuator_gear[0, 0] == 10.0
+    assert load_model("cartpole").controls == (-1.0, 1.0)
+
+
+def test_nothing_in_the_reference_hinders_the_motion():
+    model = load_model("cartpole").model
+    assert not model.geom_contype.any()
+    assert not model.geom_conaffinity.any()
+    assert not model.dof_damping.any()
+    assert not model.dof_frictionloss.any()
+    assert not model.dof_armature.any()
+    assert not model.jnt_limited.any()
+
+
+def test_every_part_of_the_reference_has_a_name():
+    model = load_model("cartpole").model
+    for count, accessor in (
+        (model.nbody, model.body),
+        (model.njnt, model.joint),
+        (model.ngeom, model.geom),
+        (model.ncam, model.cam),
+        (model.nlight, model.light),
+        (model.nu, model.actuator),
+        (model.nmat, model.mat),
+    ):
+        assert all(accessor(index).name for index in range(count))
+    assert {model.cam(index).name for index in range(model.ncam)} >= {"side", "follow"}
+
+
+@pytest.mark.parametrize("name", model_names())
+def test_shipped_models_are_well_formed_xml(name):
+    assert ElementTree.parse(models_folder() / f"{name}.xml").getroot().tag == "mujoco"
+
+
+def test_the_same_model_by_name_path_text_and_spec(tmp_path):
+    path = tmp_path / "mine.xml"
+    path.write_text(REFERENCE, encoding="utf-8")
+    spec = mujoco.MjSpec.from_string(REFERENCE)
+    by_name = load_model("cartpole")
+    for source in (path, str(path), REFERENCE, spec):
+        assert same_model(load_model(source).model, by_name.model)
+    assert by_name.xml == REFERENCE
+    assert load_model(path).name == str(path)
+
+
+def test_names_are_listed_and_a_slip_is_answered_with_the_nearest():
+    assert "cartpole" in model_names()
+    with pytest.raises(ModelNotFoundError, match=r"'cartpoel'.*did you mean 'cartpole'.*available"):
+        load_model("cartpoel")
+
+
+@pytest.mark.parametrize("source", ["nowhere.xml", "no/such/file", "/tmp"])
+def test_a_path_that_leads_nowhere(source):
+    with pytest.raises(ModelNotFoundError, match=f"'{source}' is"):
+        load_model(source)
+
+
+def test_an_xml_error_is_named_with_line_and_element(tmp_path):
+    path = tmp_path / "broken.xml"
+    path.write_text(changed('type="slide"', 'type="slide" colour="red"'), encoding="utf-8")
+    with pytest.raises(ModelSyntaxError, match=r"broken\.xml .*colour.*joint.*line \d+") as caught:
+        load_model(path)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("text", ["<mujoco><worldbody>", "<html/>", "< not xml"])
+def test_documents_that_are_no_mjcf(text):
+    with pytest.raises(ModelSyntaxError, match="not a valid MJCF"):
+        load_model(text)
+
+
+@pytest.mark.parametrize(
+    ("pattern", "replacement", "reason"),
+    [
+        ('type="slide"', 'type="hinge"', "no slide joint"),
+        ('type="hinge"', 'type="slide"', "2 slide joints"),
+        ('type="hinge" axis="0 1 0"', 'type="ball"', "no hinge joint"),
+        (
+            '(<joint name="hinge")',
+            r'<joint name="hinge2" type="hinge" axis="0 1 0"/>\1',
+            "2 hinge joints",
+        ),
+        (
+            "</worldbody>",
+            '<body name="loose"><freejoint name="free"/><geom size="1" mass="1"/></body></worldbody>',
+            "neither the cart's nor the pole's",
+        ),
+        ("<actuator>.*</actuator>", "", "no actuator"),
+        ('(<motor [^>]*/>)', r'\1<motor name="twist" joint="hinge"/>', "2 actuators"),
+        ('(<motor [^>]*)joint="slider"', r'\1joint="hinge"', "does not push along the slide"),
+        ("<motor ", '<general dyntype="integrator" actlimited="false" ', "activation states"),
+        ('timestep="0.02"', 'timestep="0.003"', "does not divide"),
+        ('timestep="0.02"', 'timestep="0.03"', "does not divide"),
+    ],
+)
+def test_what_is_no_cart_pole_is_refused_with_what_was_found(pattern, replacement, reason):
+    with pytest.raises(NotACartPoleError, match=reason) as caught:
+        load_model(changed(pattern, replacement))
+    assert "\n" not in str(caught.value)
+
+
+def test_a_hinge_outside_the_cart_is_refused():
+    text = """<mujoco><worldbody>
+      <body name="cart"><joint name="s" type="slide" axis="1 0 0"/><geom size="1"/></body>
+      <body name="pole"><joint name="h" type="hinge" axis="0 1 0"/><geom size="1"/></body>
+    </worldbody><actuator><motor joint="s"/></actuator></mujoco>"""
+    with pytest.raises(NotACartPoleError, match="not inside the cart's body"):
+        load_model(text)
+
+
+def test_actions_are_the_ends_of_the_control_range():
+    assert load_model(changed('ctrlrange="-1 1"', 'ctrlrange="-3 2"')).controls == (-3.0, 2.0)
+    assert load_model(changed('ctrlrange="-1 1"', "")).controls == (-1.0, 1.0)
+
+
+def test_a_short_timestep_makes_several_physics_steps():
+    assert load_model(changed('timestep="0.02"', 'timestep="0.005"')).substeps == 4
+
+
+def test_includes_are_put_in_their_place(tmp_path):
+    (tmp_path / "push.xml").write_text(
+        '<mujocoinclude><motor name="push" joint="slider" gear="10"/></mujocoinclude>'
+    )
+    path = tmp_path / "with_include.xml"
+    path.write_text(changed("<motor [^>]*/>", '<include file="push.xml"/>'), encoding="utf-8")
+    cartpole = load_model(path)
+    assert "<include" not in cartpole.xml
+    assert same_model(load_model(cartpole.xml).model, cartpole.model)
+    assert self_contained(REFERENCE, tmp_path) == REFERENCE
+
+
+def test_includes_in_an_ill_formed_document_are_refused(tmp_path):
+    with pytest.raises(ModelSyntaxError, match="cannot be put together"):
+        self_contained('<mujoco><!-- a -- b --><include file="x"/></mujoco>', tmp_path)

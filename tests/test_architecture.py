@@ -1,0 +1,112 @@
+"""Imports point one way, and starting up stays light."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import mjcartpole
+
+PACKAGE = Path(mjcartpole.__file__).parent
+LAYERS = ["errors", "task", "files", "physics", "media", "envs", "learning", "studies"]
+TOP = {"commands", "cli", "__main__", "__init__"}
+MUJOCO_HOMES = ("physics/", "media/", "envs/vector.py", "learning/kernels.py")
+
+SOURCES = sorted(PACKAGE.rglob("*.py"))
+
+
+def imported_modules(path):
+    """Every absolute module name that a file imports, wherever the import stands."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}: relative import"
+            if node.module == "mjcartpole":
+                yield from (f"mjcartpole.{alias.name}" for alias in node.names)
+            else:
+                yield node.module or ""
+
+
+def layer_of(path):
+    return path.relative_to(PACKAGE).parts[0].removesuffix(".py")
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(PACKAGE)))
+def test_imports_point_downwards(path):
+    layer = layer_of(path)
+    if layer in TOP:
+        return
+    for module in imported_modules(path):
+        if not module.startswith("mjcartpole."):
+            continue
+        other = module.split(".")[1]
+        assert other in LAYERS, f"{path} imports {module}, which is above every layer"
+        assert LAYERS.index(other) <= LAYERS.index(layer), f"{path} imports {module}"
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(PACKAGE)))
+def test_mujoco_stays_in_its_places(path):
+    where = str(path.relative_to(PACKAGE)).replace("\\", "/")
+    if not where.startswith(MUJOCO_HOMES):
+        assert "mujoco" not in {module.split(".")[0] for module in imported_modules(path)}
+
+
+def test_every_module_belongs_to_a_layer():
+    assert {layer_of(path) for path in SOURCES} <= {*LAYERS, *TOP}
+
+
+def loaded_after(code):
+    """Names of the packages that a fresh interpreter has loaded after running code."""
+    script = f"import sys\n{code}\nprint(*sorted({{m.split('.')[0] for m in sys.modules}}))"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert done.stderr == ""
+    return set(done.stdout.splitlines()[-1].split())
+
+
+def test_importing_the_package_is_light():
+    heavy = {"mujoco", "numba", "dm_control", "imageio", "OpenGL", "glfw", "PIL", "tyro"}
+    assert not loaded_after("import mjcartpole") & heavy
+
+
+def test_help_imports_nothing_heavy():
+    code = (
+        "import mjcartpole.cli\n"
+        "try:\n    mjcartpole.cli.main(['train', '--help'])\n"
+        "except SystemExit as stop:\n    assert stop.code == 0"
+    )
+    heavy = {"mujoco", "numba", "dm_control", "imageio", "OpenGL", "glfw", "PIL"}
+    assert not loaded_after(code) & heavy
+
+
+def test_training_touches_no_opengl_and_no_video_library():
+    code = (
+        "import mjcartpole\n"
+        "mjcartpole.train(mjcartpole.TrainConfig(episodes=2))\n"
+        "import mjcartpole.commands"
+    )
+    assert not loaded_after(code) & {"OpenGL", "imageio", "dm_control"}
+
+
+def test_public_names():
+    assert sorted(mjcartpole.__all__) == [
+        "CartPole",
+        "CartPoleEnv",
+        "ENV_ID",
+        "Evaluation",
+        "Policy",
+        "Simulation",
+        "TrainConfig",
+        "TrainResult",
+        "evaluate",
+        "load_model",
+        "model_names",
+        "train",
+    ]
+    for name in mjcartpole.__all__:
+        assert getattr(mjcartpole, name) is not None
+    assert set(mjcartpole.__all__) <= set(dir(mjcartpole))
+    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+        _ = mjcartpole.nothing

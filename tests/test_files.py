@@ -1,0 +1,100 @@
+"""Files are written whole or not at all."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from mjcartpole.errors import FileError
+from mjcartpole.files import check_writable, make_folder, replacing, write_whole
+
+
+def test_writes_and_replaces(tmp_path):
+    path = tmp_path / "deep" / "file.txt"
+    write_whole(path, "one")
+    write_whole(path, "twö")
+    assert path.read_text(encoding="utf-8") == "twö"
+    assert [entry.name for entry in path.parent.iterdir()] == ["file.txt"]
+
+
+def test_a_failing_body_leaves_the_old_file(tmp_path):
+    path = tmp_path / "file.txt"
+    path.write_text("old")
+
+    def fail():
+        with replacing(path) as temporary:
+            temporary.write_text("half")
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        fail()
+    assert path.read_text() == "old"
+    assert [entry.name for entry in tmp_path.iterdir()] == ["file.txt"]
+
+
+def test_the_temporary_name_keeps_the_suffix(tmp_path):
+    with replacing(tmp_path / "video.mp4") as temporary:
+        assert temporary.suffix == ".mp4"
+        assert temporary.parent == tmp_path
+
+
+def test_a_folder_in_the_way_is_named(tmp_path):
+    with pytest.raises(FileError, match="it is a folder"):
+        write_whole(tmp_path, "text")
+
+
+def test_a_file_where_a_folder_is_needed(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(FileError, match="cannot make the folder"):
+        make_folder(tmp_path / "file" / "sub")
+
+
+@pytest.mark.skipif(not os.path.exists("/proc/version"), reason="needs a folder nobody can write")
+def test_an_unwritable_folder_is_refused():
+    with pytest.raises(FileError, match="cannot"):
+        write_whole("/proc/nobody/file.txt", "text")
+    with pytest.raises(FileError, match="cannot"):
+        check_writable(make_folder("/proc"))
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs /dev/full")
+def test_a_full_disk_leaves_the_old_file(tmp_path):
+    path = tmp_path / "file.txt"
+    path.write_text("old")
+
+    def fill():
+        with replacing(path), open("/dev/full", "w") as full:
+            full.write("x" * 10)
+            full.flush()
+
+    with pytest.raises(FileError, match="No space left"):
+        fill()
+    assert path.read_text() == "old"
+
+
+WRITER = """
+import sys
+from mjcartpole.files import write_whole
+print("ready", flush=True)
+number = 0
+while True:
+    number = 1 - number
+    write_whole(sys.argv[1], str(number) * 200_000)
+"""
+
+
+def test_a_kill_leaves_the_old_file_or_the_new_one(tmp_path):
+    path = tmp_path / "file.txt"
+    write_whole(path, "0" * 200_000)
+    for attempt in range(8):
+        writer = subprocess.Popen(
+            [sys.executable, "-c", WRITER, str(path)], stdout=subprocess.PIPE, text=True
+        )
+        assert writer.stdout.readline() == "ready\n"
+        time.sleep(0.003 * attempt)
+        writer.send_signal(signal.SIGKILL)
+        writer.communicate()
+        assert path.read_text() in {"0" * 200_000, "1" * 200_000}

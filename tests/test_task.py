@@ -1,0 +1,55 @@
+"""CartPole-v1's rules, on both sides of every limit."""
+
+import math
+
+import gymnasium
+import numpy as np
+import pytest
+
+from mjcartpole import task
+
+UP = math.inf
+
+
+@pytest.mark.parametrize(
+    ("x", "theta", "over"),
+    [
+        (0.0, 0.0, False),
+        (task.X_LIMIT, 0.0, False),
+        (math.nextafter(task.X_LIMIT, UP), 0.0, True),
+        (-task.X_LIMIT, 0.0, False),
+        (math.nextafter(-task.X_LIMIT, -UP), 0.0, True),
+        (0.0, task.THETA_LIMIT, False),
+        (0.0, math.nextafter(task.THETA_LIMIT, UP), True),
+        (0.0, -task.THETA_LIMIT, False),
+        (0.0, math.nextafter(-task.THETA_LIMIT, -UP), True),
+        (UP, 0.0, True),
+    ],
+)
+def test_termination_is_strict(x, theta, over):
+    assert task.has_terminated(x, theta) is over
+
+
+def test_numbers_are_gymnasiums():
+    env = gymnasium.make("CartPole-v1").unwrapped
+    assert task.CONTROL_STEP == env.tau
+    assert task.X_LIMIT == env.x_threshold
+    assert task.THETA_LIMIT == env.theta_threshold_radians
+    np.testing.assert_array_equal(task.observation_bound(), env.observation_space.high)
+    spec = gymnasium.spec("CartPole-v1")
+    assert (task.TIME_LIMIT, task.REWARD_THRESHOLD) == (spec.max_episode_steps, 475.0)
+
+
+@pytest.mark.parametrize(
+    ("terminated", "already_over", "plain", "sutton_barto"),
+    [
+        (False, False, 1.0, 0.0),
+        (True, False, 1.0, -1.0),
+        (True, True, 0.0, -1.0),
+        (False, True, 1.0, 0.0),
+    ],
+)
+def test_reward(terminated, already_over, plain, sutton_barto):
+    arguments = {"terminated": terminated, "already_over": already_over}
+    assert task.reward(**arguments, sutton_barto=False) == plain
+    assert task.reward(**arguments, sutton_barto=True) == sutton_barto
