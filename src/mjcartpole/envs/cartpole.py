@@ -13,7 +13,7 @@ from mjcartpole import task
 from mjcartpole.errors import ConfigError, InvalidActionError, ResetNeededError
 from mjcartpole.envs.registration import ENV_ID
 from mjcartpole.media.renderer import Renderer, open_renderer
-from mjcartpole.media.window import Window
+from mjcartpole.media.window import Window, open_window
 from mjcartpole.physics.integrator import Integrator
 from mjcartpole.physics.model import ModelLike, load_model
 from mjcartpole.physics.simulation import (
@@ -109,7 +109,7 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], int]):
     | `model`               | str, path, MjSpec      | "cartpole"  | A shipped model's name, an MJCF file, an XML document, or an MjSpec |
     | `integrator`          | "gym" or "mujoco"      | "gym"       | Explicit Euler as CartPole-v1, or the integrator that the file names |
     | `sutton_barto_reward` | bool                   | False       | See Rewards                   |
-    | `render_mode`         | None, "rgb_array", "human" | None    | Nothing, arrays, or a window  |
+    | `render_mode`         | None, "rgb_array", "human" | None    | Nothing, arrays, or a window (where there is a screen) |
     | `width`, `height`     | int                    | 640, 480    | Size of a picture, in pixels  |
     | `camera`              | str                    | "side"      | A camera of the model         |
 
@@ -117,7 +117,7 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], int]):
 
     >>> env.unwrapped.state = (0.0, 0.0, 0.1, 0.0)
     >>> [round(float(value), 4) for value in env.step(1)[0]]
-    [0.0, 0.1935, 0.1, -0.2605]
+    [0.0, 0.1936, 0.1, -0.2595]
     >>> env.close()
 
     ## Version History
@@ -255,7 +255,7 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], int]):
             shows a window, without a render mode, which warns, and before the first reset.
 
         Raises:
-            RenderError: The camera or the size cannot be used, or there is no screen for a window.
+            RenderError: The camera or the size cannot be used.
         """
         if self.render_mode is None:
             logger.warn(
@@ -268,7 +268,7 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], int]):
             return None
         if self.render_mode == "human":
             if self._window is None:
-                self._window = Window(self.simulation.cartpole)
+                self._window = open_window(self.simulation.cartpole)
             self._window.show(self.state)
             return None
         if self._renderer is None:

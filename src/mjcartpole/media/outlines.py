@@ -132,7 +132,7 @@ class Light:
     @classmethod
     def of(cls, light: Any) -> Self:  # noqa: ANN401
         """A light from MuJoCo's scene."""
-        is_far = light.type == mujoco.mjtLightType.mjLIGHT_DIRECTIONAL and not light.headlight
+        is_far = light.type == mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
         return cls(
             ambient=np.array(light.ambient, float),
             diffuse=np.array(light.diffuse, float),
@@ -183,8 +183,8 @@ class _Body:
 
     def world(self, local: Points) -> Points:
         """Points of the geom's frame, shape (n, 3), in the world."""
-        turned: Points = local @ self.turn.T
-        return turned + self.position
+        points: Points = local @ self.turn.T + self.position
+        return points
 
     def face(self, local: Points, normal: Points, *, is_large: bool = False) -> None:
         """Draw a flat face, unless it looks away; of a large one only what is in the picture.

@@ -101,20 +101,12 @@ def _write_mp4(path: Path, frames: Iterator[Frame], shape: tuple[int, ...], fps:
 def _encoder(path: Path, shape: tuple[int, ...], fps: int) -> Iterator[IO[bytes]]:
     """Yield ffmpeg's input; afterwards the file is complete, or ffmpeg is gone."""
     with tempfile.TemporaryFile() as messages:
-        process = subprocess.Popen(
-            _command(path, shape, fps),
-            stdin=subprocess.PIPE,
-            stdout=subprocess.DEVNULL,
-            stderr=messages,
-            # Ctrl-C is for this process, which then ends ffmpeg itself.
-            start_new_session=True,
-        )
+        process = _start(_command(path, shape, fps), messages)
         assert process.stdin is not None
         try:
+            # ffmpeg closes its input when it fails; its exit code and message say why.
             with contextlib.suppress(BrokenPipeError):
                 yield process.stdin
-                process.stdin.close()
-            process.wait()
         except BaseException:
             process.kill()
             raise
@@ -127,12 +119,26 @@ def _encoder(path: Path, shape: tuple[int, ...], fps: int) -> Iterator[IO[bytes]
             raise RenderError(f"ffmpeg failed: {_last_line(messages.read())}")
 
 
+def _start(command: list[str], messages: IO[bytes]) -> subprocess.Popen[bytes]:
+    try:
+        return subprocess.Popen(
+            command,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.DEVNULL,
+            stderr=messages,
+            # Ctrl-C is for this process, which then ends ffmpeg itself.
+            start_new_session=True,
+        )
+    except OSError as error:
+        raise RenderError(f"ffmpeg cannot be run ('{command[0]}'): {error.strerror}") from error
+
+
 def _command(path: Path, shape: tuple[int, ...], fps: int) -> list[str]:
     height, width = shape[:2]
     source = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", str(fps)]
     # The colours are converted and labelled as BT.709, so that players need not guess.
-    colours = ["-vf", "scale=out_color_matrix=bt709", "-pix_fmt", "yuv420p"]
-    colours += ["-colorspace", "bt709", "-color_primaries", "bt709", "-color_trc", "bt709"]
+    labels = "colorspace=bt709:color_primaries=bt709:color_trc=bt709:range=tv"
+    colours = ["-vf", f"scale=out_color_matrix=bt709:out_range=tv,format=yuv420p,setparams={labels}"]
     codec = ["-c:v", "libx264", "-preset", "veryfast", "-crf", "18"]
     # faststart: the index comes first, so that a browser can play before it has all.
     target = ["-movflags", "+faststart", "-f", "mp4", str(path)]
@@ -172,7 +178,9 @@ def _write_gif(path: Path, frames: Iterator[Frame], fps: int) -> int:
 
     stream = images()
     duration = 10 * max(round(100 / fps), _SHORTEST_GIF_FRAME)
-    next(stream).save(
-        path, save_all=True, append_images=stream, duration=duration, loop=0, optimize=False
-    )
+    # Pillow closes a file that it opened only after some kinds of errors.
+    with path.open("wb") as file:
+        next(stream).save(
+            file, "GIF", save_all=True, append_images=stream, duration=duration, loop=0
+        )
     return count

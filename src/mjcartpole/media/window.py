@@ -1,46 +1,64 @@
 """A window that shows a cart-pole as it moves: MuJoCo's own viewer."""
 
+import logging
 import os
 import sys
 import time
+from typing import Protocol
 
 import mujoco
 import numpy as np
 import numpy.typing as npt
 
 from mjcartpole import task
-from mjcartpole.errors import RenderError
 from mjcartpole.physics.model import CartPole
 
+_log = logging.getLogger("mjcartpole")
 
-class Window:
-    """MuJoCo's passive viewer, shown in real time: one picture per control step."""
+
+class Window(Protocol):
+    """Shows states, one per control step."""
+
+    def show(self, state: npt.NDArray[np.float64]) -> None:
+        """Show a state `(x, x_dot, theta, theta_dot)`."""
+
+    def close(self) -> None:
+        """Close the window."""
+
+
+def open_window(cartpole: CartPole) -> Window:
+    """Open a window, or say why there is none and go on without.
+
+    A program that was written for a desk should still run on a server.
+    """
+    if sys.platform == "linux" and not _has_screen():
+        return NoWindow("neither DISPLAY nor WAYLAND_DISPLAY is set")
+    try:
+        return ViewerWindow(cartpole)
+    except (RuntimeError, mujoco.FatalError, ImportError, OSError) as error:
+        return NoWindow(f"MuJoCo's viewer does not start: {error}")
+
+
+class ViewerWindow:
+    """MuJoCo's passive viewer, in real time."""
 
     def __init__(self, cartpole: CartPole) -> None:
         """Open the window.
 
         Raises:
-            RenderError: There is no screen, or the viewer does not start.
+            RuntimeError: The viewer does not start (on macOS it needs `mjpython`).
         """
-        if sys.platform == "linux" and not _has_screen():
-            raise RenderError(
-                'render_mode="human" needs a screen, and neither DISPLAY nor WAYLAND_DISPLAY is '
-                'set; use render_mode="rgb_array", or `mjcartpole render` for a video'
-            )
         import mujoco.viewer  # noqa: PLC0415 - it looks for a window system when imported
 
         self._cartpole = cartpole
         self._data = mujoco.MjData(cartpole.model)
-        try:
-            self._viewer = mujoco.viewer.launch_passive(
-                cartpole.model, self._data, show_left_ui=False, show_right_ui=False
-            )
-        except RuntimeError as error:
-            raise RenderError(f"MuJoCo's viewer does not start: {error}") from error
+        self._viewer = mujoco.viewer.launch_passive(
+            cartpole.model, self._data, show_left_ui=False, show_right_ui=False
+        )
         self._next_frame = time.monotonic()
 
     def show(self, state: npt.NDArray[np.float64]) -> None:
-        """Show a state `(x, x_dot, theta, theta_dot)` when its time has come."""
+        """Show a state when its time has come."""
         time.sleep(max(0.0, self._next_frame - time.monotonic()))
         self._next_frame = time.monotonic() + task.CONTROL_STEP
         with self._viewer.lock():
@@ -52,6 +70,24 @@ class Window:
     def close(self) -> None:
         """Close the window."""
         self._viewer.close()
+
+
+class NoWindow:
+    """Stands where no window can be opened."""
+
+    def __init__(self, why: str) -> None:
+        """Say so, once."""
+        _log.warning(
+            'render_mode="human" shows nothing: %s; use render_mode="rgb_array", '
+            "or `mjcartpole render` for a video",
+            why,
+        )
+
+    def show(self, state: npt.NDArray[np.float64]) -> None:
+        """Do nothing."""
+
+    def close(self) -> None:
+        """Do nothing."""
 
 
 def _has_screen() -> bool:

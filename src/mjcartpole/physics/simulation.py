@@ -1,5 +1,6 @@
 """State in, control in, state out: a cart-pole moved by MuJoCo, one control step at a time."""
 
+import copy
 from collections.abc import Callable
 
 import mujoco
@@ -42,7 +43,10 @@ class Simulation:
         self.integrator = integrator
         self._model = _stepping_model(cartpole.model, integrator)
         self.data = mujoco.MjData(self._model)
-        self.step: Callable[[float], State] = self._make_step()
+        # Memory views read and write single floats several times faster than numpy arrays do.
+        self._qpos, self._qvel = memoryview(self.data.qpos), memoryview(self.data.qvel)
+        make_step = _explicit_euler if integrator == "gym" else _own_integrator
+        self.step: Callable[[float], State] = make_step(self._model, self.data, cartpole)
 
     @property
     def state(self) -> npt.NDArray[np.float64]:
@@ -65,14 +69,9 @@ class Simulation:
             )
         mujoco.mj_resetData(self._model, self.data)
         slider, hinge = self.cartpole.slider, self.cartpole.hinge
-        self.data.qpos[slider], self.data.qvel[slider] = values[0], values[1]
-        self.data.qpos[hinge], self.data.qvel[hinge] = values[2], values[3]
-
-    def _make_step(self) -> Callable[[float], State]:
-        substeps = self.cartpole.substeps
-        if self.integrator == "gym":
-            return _explicit_euler(self._model, self.data, self.cartpole, substeps)
-        return _own_integrator(self._model, self.data, self.cartpole, substeps)
+        x, x_dot, theta, theta_dot = values.tolist()
+        self._qpos[slider], self._qvel[slider] = x, x_dot
+        self._qpos[hinge], self._qvel[hinge] = theta, theta_dot
 
 
 def _stepping_model(model: mujoco.MjModel, integrator: Integrator) -> mujoco.MjModel:
@@ -81,7 +80,7 @@ def _stepping_model(model: mujoco.MjModel, integrator: Integrator) -> mujoco.MjM
     MuJoCo answers a NaN by silently starting over from the reference position, a pole that
     stands by magic. That is switched off, so that the NaN can be seen and reported.
     """
-    stepped = mujoco.MjModel.__copy__(model)
+    stepped = copy.copy(model)
     stepped.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     if integrator == "gym":
         # Explicit Euler takes the acceleration as it is, so no implicit damping either.
@@ -91,11 +90,11 @@ def _stepping_model(model: mujoco.MjModel, integrator: Integrator) -> mujoco.MjM
 
 
 def _explicit_euler(
-    model: mujoco.MjModel, data: mujoco.MjData, cartpole: CartPole, substeps: int
+    model: mujoco.MjModel, data: mujoco.MjData, cartpole: CartPole
 ) -> Callable[[float], State]:
-    # Memory views read and write single floats several times faster than numpy arrays do.
     qpos, qvel, ctrl = memoryview(data.qpos), memoryview(data.qvel), memoryview(data.ctrl)
-    slider, hinge, h = cartpole.slider, cartpole.hinge, float(model.opt.timestep)
+    slider, hinge, substeps = cartpole.slider, cartpole.hinge, cartpole.substeps
+    h = float(model.opt.timestep)
     mj_step = mujoco.mj_step
 
     def step(control: float) -> State:
@@ -116,10 +115,10 @@ def _explicit_euler(
 
 
 def _own_integrator(
-    model: mujoco.MjModel, data: mujoco.MjData, cartpole: CartPole, substeps: int
+    model: mujoco.MjModel, data: mujoco.MjData, cartpole: CartPole
 ) -> Callable[[float], State]:
     qpos, qvel, ctrl = memoryview(data.qpos), memoryview(data.qvel), memoryview(data.ctrl)
-    slider, hinge = cartpole.slider, cartpole.hinge
+    slider, hinge, substeps = cartpole.slider, cartpole.hinge, cartpole.substeps
     mj_step = mujoco.mj_step
 
     def step(control: float) -> State:

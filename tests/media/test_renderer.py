@@ -1,0 +1,264 @@
+import math
+import subprocess
+import sys
+import threading
+
+import mujoco
+import numpy as np
+import pytest
+
+from mjcartpole.errors import RenderError
+from mjcartpole.media import gl
+from mjcartpole.media import renderer as renderer_module
+from mjcartpole.media.renderer import GLRenderer, open_renderer
+from mjcartpole.media.scene import Scene
+from mjcartpole.physics.model import load_model
+
+WIDTH, HEIGHT = 640, 480
+HALF_VIEW = 9 * math.tan(math.radians(26) / 2) * WIDTH / HEIGHT
+"""Metres from the middle of the side camera's picture to its edge, at the pole's distance."""
+
+STATES = [
+    (0.0, 0.0, 0.0, 0.0),
+    (1.234, 0.5, 0.2, -1.0),
+    (-0.77, 0.0, -0.17, 2.0),
+    (2.4, 0.0, 0.2094, 0.0),
+    (-2.4, 0.0, -0.031, 0.0),
+    (0.3, 0.0, 1.2, 0.0),
+]
+
+WITHOUT_CAMERA = """
+<mujoco model="bare">
+  <option timestep="0.02"/>
+  <worldbody>
+    <body>
+      <joint name="slider" type="slide" axis="1 0 0"/>
+      <geom type="box" size="0.2 0.1 0.1" rgba="0 0 1 1"/>
+      <body>
+        <joint name="hinge" type="hinge" axis="0 1 0"/>
+        <geom type="capsule" fromto="0 0 0 0 0 1" size="0.03" rgba="1 0.6 0 1"/>
+      </body>
+    </body>
+  </worldbody>
+  <actuator><motor joint="slider"/></actuator>
+</mujoco>
+"""
+
+
+@pytest.fixture(scope="module")
+def cartpole():
+    return load_model()
+
+
+@pytest.fixture(scope="module", params=["gl", "sketch"])
+def kind(request):
+    if request.param == "sketch":
+        return "sketch"
+    backend = gl.find_backend()
+    if backend is None:
+        pytest.skip("no OpenGL works here")
+    return backend
+
+
+@pytest.fixture(scope="module")
+def renderer(cartpole, kind):
+    with open_renderer(cartpole, width=WIDTH, height=HEIGHT, kind=kind) as renderer:
+        yield renderer
+
+
+def pixels_of(frame, colour):
+    """Columns and rows, shape (2, n), of the pixels of the pole or of the cart."""
+    red, green, blue = (frame[..., index].astype(int) for index in range(3))
+    pole = (red > blue + 60) & (green > blue + 30)
+    cart = (blue > red + 60) & (blue > green + 30)
+    rows, columns = np.nonzero(pole if colour == "pole" else cart)
+    return np.array([columns, rows])
+
+
+def measured_angle(frame):
+    """The pole's angle from upright in radians, positive to the right: its pixels' main axis."""
+    columns, rows = pixels_of(frame, "pole")
+    axes = np.linalg.svd(np.array([columns - columns.mean(), rows - rows.mean()]))[0]
+    right, down = axes[:, 0]
+    return math.atan2(right, -down) if down < 0 else math.atan2(-right, down)
+
+
+def measured_position(frame):
+    """The cart's position in metres."""
+    columns, _ = pixels_of(frame, "cart")
+    middle = (columns.min() + columns.max() + 1) / 2
+    return (middle - WIDTH / 2) / (WIDTH / 2) * HALF_VIEW
+
+
+@pytest.mark.parametrize("state", STATES)
+def test_the_picture_is_true(renderer, state):
+    frame = renderer.render(state)
+    assert frame.shape == (HEIGHT, WIDTH, 3)
+    assert frame.dtype == np.uint8
+    assert measured_angle(frame) == pytest.approx(state[2], abs=math.radians(1))
+    assert measured_position(frame) == pytest.approx(state[0], abs=0.02 * 4.8)
+
+
+def test_frames_of_different_states_differ_and_belong_to_the_caller(renderer):
+    first = renderer.render((0.0, 0.0, 0.05, 0.0))
+    kept = first.copy()
+    second = renderer.render((0.01, 0.0, 0.05, 0.0))
+    assert (first == kept).all()
+    assert (first != second).any()
+    assert (renderer.render((0.0, 0.0, 0.05, 0.0)) == first).all()
+
+
+def test_the_track_ends_are_in_the_picture(renderer):
+    frame = renderer.render((0.0, 0.0, 0.0, 0.0)).astype(int)
+    red = (frame[..., 0] > frame[..., 1] + 60) & (frame[..., 0] > frame[..., 2] + 60)
+    pole = (frame[..., 1] > frame[..., 2] + 30) & red
+    columns = np.nonzero((red & ~pole).any(axis=0))[0]
+    ends = (np.array([columns.min(), columns.max() + 1]) - WIDTH / 2) / (WIDTH / 2) * HALF_VIEW
+    assert ends == pytest.approx([-2.66, 2.66], abs=0.05)
+
+
+def test_the_following_camera_keeps_the_cart_in_the_middle(cartpole, kind):
+    with open_renderer(cartpole, kind=kind, camera="follow", width=WIDTH) as renderer:
+        for x in (-2.0, 1.5):
+            columns, _ = pixels_of(renderer.render((x, 0.0, 0.0, 0.0)), "cart")
+            assert columns.mean() == pytest.approx(WIDTH / 2, abs=0.1 * WIDTH)
+
+
+def test_a_model_without_a_camera_is_seen_as_a_whole(kind):
+    with open_renderer(load_model(WITHOUT_CAMERA), kind=kind) as renderer:
+        for x in (-2.4, 0.0, 2.4):
+            columns, _ = pixels_of(renderer.render((x, 0.0, 0.0, 0.0)), "cart")
+            assert columns.min() > 0
+            assert columns.max() < WIDTH - 1
+            assert np.sign(columns.mean() - WIDTH / 2 + 0.5).round() == np.sign(x) or x == 0
+
+
+@pytest.mark.parametrize(("width", "height"), [(16, 16), (333, 77), (2000, 1200)])
+def test_any_size_works(cartpole, kind, width, height):
+    with open_renderer(cartpole, kind=kind, width=width, height=height) as renderer:
+        frame = renderer.render((0.0, 0.0, 0.0, 0.0))
+    assert frame.shape == (height, width, 3)
+    assert frame.std() > 0
+
+
+@pytest.mark.parametrize("state", [(0.0, 0.0, 0.0), (0.0, 0.0, math.nan, 0.0), 1.0])
+def test_what_is_no_state_is_refused(renderer, state):
+    with pytest.raises(RenderError, match="4 finite numbers"):
+        renderer.render(state)
+
+
+def test_a_closed_renderer_says_so(cartpole, kind):
+    renderer = open_renderer(cartpole, kind=kind, width=16, height=16)
+    renderer.close()
+    renderer.close()
+    with pytest.raises(RenderError, match="closed"):
+        renderer.render((0.0, 0.0, 0.0, 0.0))
+
+
+@pytest.mark.parametrize("size", [15, 8193, -1, 640.0, "640", None])
+@pytest.mark.parametrize("side", ["width", "height"])
+def test_a_size_that_makes_no_sense_is_refused(cartpole, side, size):
+    with pytest.raises(RenderError, match=f"{side} .*from 16 to 8192"):
+        open_renderer(cartpole, kind="sketch", **{side: size})
+
+
+def test_an_unknown_camera_is_refused_with_those_there_are(cartpole):
+    with pytest.raises(RenderError, match="no camera 'top'; available: side, follow"):
+        open_renderer(cartpole, camera="top")
+    with pytest.raises(RenderError, match="no camera 'top'; available: free"):
+        open_renderer(load_model(WITHOUT_CAMERA), camera="top")
+
+
+def test_an_unknown_kind_is_refused(cartpole):
+    with pytest.raises(RenderError, match="'vulkan' is unknown; available: auto, egl"):
+        open_renderer(cartpole, kind="vulkan")
+
+
+def test_a_backend_asked_for_by_name_that_does_not_work_is_an_error(cartpole, monkeypatch):
+    monkeypatch.setattr(gl, "can_use", lambda backend: False)
+    with pytest.raises(RenderError, match="OpenGL by osmesa does not work here"):
+        open_renderer(cartpole, kind="osmesa")
+    with open_renderer(cartpole) as renderer:
+        assert renderer.kind == "sketch"
+
+
+def test_a_backend_that_fails_after_its_probe_gives_way_to_the_sketch(cartpole, monkeypatch):
+    def fail(*_):
+        raise RenderError("no context")
+
+    monkeypatch.setattr(gl, "find_backend", lambda: "egl")
+    monkeypatch.setattr(renderer_module, "GLRenderer", fail)
+    with open_renderer(cartpole) as renderer:
+        assert renderer.kind == "sketch"
+
+
+def test_drawing_leaves_the_model_alone(cartpole, renderer):
+    model = cartpole.model
+    before = model.qpos0.copy(), model.vis.global_.offwidth, model.body_mass.copy()
+    renderer.render((1.0, 0.0, 0.2, 0.0))
+    after = model.qpos0, model.vis.global_.offwidth, model.body_mass
+    assert all(np.array_equal(a, b) for a, b in zip(before, after, strict=True))
+
+
+def test_a_renderer_may_move_to_another_thread(cartpole, kind):
+    frames = []
+    with open_renderer(cartpole, kind=kind, width=64, height=48) as renderer:
+        here = renderer.render((1.0, 0.0, 0.1, 0.0))
+        thread = threading.Thread(
+            target=lambda: frames.append(renderer.render((1.0, 0.0, 0.1, 0.0)))
+        )
+        thread.start()
+        thread.join()
+    assert (frames[0] == here).all()
+
+
+def test_renderers_do_not_disturb_each_other(cartpole, kind):
+    state = (0.5, 0.0, 0.1, 0.0)
+    with (
+        open_renderer(cartpole, kind=kind, width=64, height=48) as small,
+        open_renderer(cartpole, kind=kind, width=160, height=120) as large,
+    ):
+        before = small.render(state)
+        large.render((-1.0, 0.0, 0.0, 0.0))
+        assert (small.render(state) == before).all()
+
+
+def test_a_failing_drawing_context_is_a_render_error(cartpole, monkeypatch):
+    if (backend := gl.find_backend()) is None:
+        pytest.skip("no OpenGL works here")
+
+    def fail(*_):
+        raise mujoco.FatalError("gladLoadGL error")
+
+    monkeypatch.setattr(mujoco, "MjrContext", fail)
+    with pytest.raises(RenderError, match="MuJoCo cannot draw by .*: gladLoadGL error"):
+        GLRenderer(Scene(cartpole, 16, 16, "side"), backend)
+
+
+def test_egl_osmesa_and_sketch_show_the_same(cartpole, tmp_path):
+    """Each OpenGL in its own process, since one process can only have one of them."""
+    code = """
+import sys, numpy
+from mjcartpole.media.renderer import open_renderer
+from mjcartpole.physics.model import load_model
+kind, path, *state = sys.argv[1:]
+with open_renderer(load_model(), kind=kind) as renderer:
+    numpy.save(path, renderer.render([float(value) for value in state]))
+"""
+    state = (1.1, 0.0, -0.15, 0.0)
+    with open_renderer(cartpole, kind="sketch") as sketch:
+        expected = sketch.render(state).astype(float)
+    frames = {}
+    for kind in ("egl", "osmesa"):
+        if sys.platform == "linux" and gl.works(kind):
+            path = tmp_path / f"{kind}.npy"
+            arguments = [kind, str(path), *map(str, state)]
+            subprocess.run([sys.executable, "-c", code, *arguments], check=True, timeout=120)
+            frames[kind] = np.load(path).astype(float)
+    if not frames:
+        pytest.skip("neither EGL nor OSMesa works here")
+    for frame in frames.values():
+        assert np.abs(frame - expected).mean() < 0.01 * 255
+        assert measured_angle(frame) == pytest.approx(state[2], abs=math.radians(1))
+    if len(frames) == 2:
+        assert np.abs(frames["egl"] - frames["osmesa"]).mean() < 0.01 * 255
