@@ -61,7 +61,9 @@ def test_every_module_belongs_to_a_layer():
 def loaded_after(code):
     """Names of the packages that a fresh interpreter has loaded after running code."""
     script = f"import sys\n{code}\nprint(*sorted({{m.split('.')[0] for m in sys.modules}}))"
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True
+    )
     assert done.stderr == ""
     return set(done.stdout.splitlines()[-1].split())
 

@@ -32,12 +32,12 @@ def test_termination_is_strict(x, theta, over):
 
 def test_numbers_are_gymnasiums():
     env = gymnasium.make("CartPole-v1").unwrapped
-    assert task.CONTROL_STEP == env.tau
-    assert task.X_LIMIT == env.x_threshold
-    assert task.THETA_LIMIT == env.theta_threshold_radians
+    assert env.tau == task.CONTROL_STEP
+    assert env.x_threshold == task.X_LIMIT
+    assert env.theta_threshold_radians == task.THETA_LIMIT
     np.testing.assert_array_equal(task.observation_bound(), env.observation_space.high)
     spec = gymnasium.spec("CartPole-v1")
-    assert (task.TIME_LIMIT, task.REWARD_THRESHOLD) == (spec.max_episode_steps, 475.0)
+    assert (spec.max_episode_steps, 475.0) == (task.TIME_LIMIT, task.REWARD_THRESHOLD)
 
 
 @pytest.mark.parametrize(

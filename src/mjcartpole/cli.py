@@ -160,7 +160,7 @@ def parse(argv: Sequence[str]) -> Command:
     try:
         with contextlib.redirect_stderr(complaint):
             command: Command = tyro.cli(
-                grammar,  # type: ignore[arg-type]
+                grammar,
                 args=list(argv),
                 prog="mjcartpole",
                 description="CartPole-v1 as real physics: train a Q-table, evaluate it, film it.",

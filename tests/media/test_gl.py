@@ -161,7 +161,9 @@ def test_renderers_nobody_closes_end_in_silence(wish):
     if not gl.works(wish):
         pytest.skip(f"no OpenGL by {wish} here")
     # MuJoCo itself is imported without the wish; only the choice of a backend sees it.
-    done = run(f"import mujoco, os\nos.environ['{gl.VARIABLE}'] = '{wish}'\n" + textwrap.dedent(FORGETFUL))
+    done = run(
+        f"import mujoco, os\nos.environ['{gl.VARIABLE}'] = '{wish}'\n" + textwrap.dedent(FORGETFUL)
+    )
     assert (done.returncode, done.stdout.strip(), done.stderr) == (0, wish, "")
 
 

@@ -231,7 +231,7 @@ def test_a_failing_drawing_context_is_a_render_error(cartpole, monkeypatch):
         raise mujoco.FatalError("gladLoadGL error")
 
     monkeypatch.setattr(mujoco, "MjrContext", fail)
-    with pytest.raises(RenderError, match="MuJoCo cannot draw by .*: gladLoadGL error"):
+    with pytest.raises(RenderError, match=r"MuJoCo cannot draw by .*: gladLoadGL error"):
         GLRenderer(Scene(cartpole, 16, 16, "side"), backend)
 
 

@@ -56,13 +56,15 @@ def test_known_first_state():
 
 
 @pytest.mark.parametrize(
-    "options", [{"low": -0.2, "high": 0.2}, {"low": -0.01}, {"high": 1}, {}, {"low": "0", "high": 0}]
+    "options",
+    [{"low": -0.2, "high": 0.2}, {"low": -0.01}, {"high": 1}, {}, {"low": "0", "high": 0}],
 )
 def test_first_observations_for_other_bounds(options):
     ours, reference = pair()
     for seed in range(20):
         np.testing.assert_array_equal(
-            ours.reset(seed=seed, options=options)[0], reference.reset(seed=seed, options=options)[0]
+            ours.reset(seed=seed, options=options)[0],
+            reference.reset(seed=seed, options=options)[0],
         )
 
 
@@ -81,9 +83,7 @@ def test_bounds_are_refused_alike(options):
 @pytest.mark.parametrize("integrator", ["gym", "mujoco"])
 @pytest.mark.parametrize("sutton_barto", [False, True])
 def test_teacher_forced_transitions(integrator, sutton_barto):
-    ours, reference = (
-        env.unwrapped for env in pair(integrator, sutton_barto_reward=sutton_barto)
-    )
+    ours, reference = (env.unwrapped for env in pair(integrator, sutton_barto_reward=sutton_barto))
     rng = np.random.default_rng(12)
     box = np.array([2.5, 4.0, 0.22, 4.0])
     for _ in range(5_000):
@@ -138,8 +138,8 @@ def fall(env, steps):
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         while not terminated:
-            *_, terminated, truncated, info = results_of = env.step(1)
-            results.append(results_of)
+            results.append(env.step(1))
+            terminated = results[-1][2]
         results += [env.step(1) for _ in range(steps)]
     return results, [str(warning.message) for warning in caught]
 

@@ -118,11 +118,11 @@ def test_documents_that_are_no_mjcf(text):
         ),
         (
             "</worldbody>",
-            '<body name="loose"><freejoint name="free"/><geom size="1" mass="1"/></body></worldbody>',
+            '<body><freejoint name="free"/><geom size="1" mass="1"/></body></worldbody>',
             "neither the cart's nor the pole's",
         ),
         ("<actuator>.*</actuator>", "", "no actuator"),
-        ('(<motor [^>]*/>)', r'\1<motor name="twist" joint="hinge"/>', "2 actuators"),
+        ("(<motor [^>]*/>)", r'\1<motor name="twist" joint="hinge"/>', "2 actuators"),
         ('(<motor [^>]*)joint="slider"', r'\1joint="hinge"', "does not push along the slide"),
         ("<motor ", '<general dyntype="integrator" actlimited="false" ', "activation states"),
         ('timestep="0.02"', 'timestep="0.003"', "does not divide"),

@@ -25,9 +25,7 @@ def accelerations(x_dot, theta, theta_dot, force):
     """
     cart, pole, half, gravity = 1.0, 0.1, 0.5, 9.8
     sin, cos = np.sin(theta), np.cos(theta)
-    mass = np.array(
-        [[cart + pole, pole * half * cos], [pole * half * cos, 4 / 3 * pole * half**2]]
-    )
+    mass = np.array([[cart + pole, pole * half * cos], [pole * half * cos, 4 / 3 * pole * half**2]])
     right = np.array([force + pole * half * theta_dot**2 * sin, pole * gravity * half * sin])
     return np.linalg.solve(mass, right)
 

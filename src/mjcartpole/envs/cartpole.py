@@ -1,7 +1,8 @@
 """CartPole-v1 with MuJoCo underneath, as a `gymnasium.Env`."""
 
 import functools
-from typing import Any, ClassVar, Final, Literal, get_args
+from collections.abc import Callable
+from typing import Any, Final, Literal, get_args
 
 import gymnasium
 import numpy as np
@@ -10,8 +11,8 @@ from gymnasium import logger, spaces
 from gymnasium.envs.classic_control.utils import maybe_parse_reset_bounds
 
 from mjcartpole import task
-from mjcartpole.errors import ConfigError, InvalidActionError, ResetNeededError
 from mjcartpole.envs.registration import ENV_ID
+from mjcartpole.errors import ConfigError, InvalidActionError, ResetNeededError
 from mjcartpole.media.renderer import Renderer, open_renderer
 from mjcartpole.media.window import Window, open_window
 from mjcartpole.physics.integrator import Integrator
@@ -32,13 +33,13 @@ _THETA_LIMIT: Final = task.THETA_LIMIT
 _SANE: Final = LARGEST_SANE
 
 _STEP_AFTER_END = (
-    "You are calling 'step()' even though this environment has already returned terminated = True. "
-    "You should always call 'reset()' once you receive 'terminated = True' -- any further steps are "
-    "undefined behavior."
+    "You are calling 'step()' even though this environment has already returned "
+    "terminated = True. You should always call 'reset()' once you receive "
+    "'terminated = True' -- any further steps are undefined behavior."
 )
 
 
-class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], int]):
+class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int]):
     """CartPole-v1, moved by MuJoCo.
 
     ## Description
@@ -125,7 +126,7 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], int]):
     * v1: the rules of CartPole-v1.
     """  # noqa: E501 - a table's rows cannot be wrapped
 
-    metadata: ClassVar[dict[str, Any]] = {
+    metadata: dict[str, Any] = {  # noqa: RUF012 - gymnasium's own declaration
         "render_modes": ["human", "rgb_array"],
         "render_fps": round(1 / task.CONTROL_STEP),
     }
@@ -157,7 +158,7 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], int]):
         self.action_space = spaces.Discrete(task.N_ACTIONS)
         self.render_mode = render_mode
         self.simulation = Simulation(load_model(model), integrator)
-        self._advance = _needs_reset
+        self._advance: Callable[[float], State] = _needs_reset
         self._left, self._right = self.simulation.cartpole.controls
         self._sutton_barto_reward = sutton_barto_reward
         self._step_reward = task.reward(
@@ -181,7 +182,7 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], int]):
         self._advance = self.simulation.step
 
     def step(
-        self, action: int
+        self, action: np.int64 | int
     ) -> tuple[npt.NDArray[np.float32], float, bool, bool, dict[str, Any]]:
         """Advance 0.02 s.
 
@@ -191,7 +192,7 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], int]):
             SimulationError: The physics diverged.
         """
         # The hot path: plain floats and no look-up that can be spared.
-        kind = action.__class__
+        kind: type = action.__class__
         if kind is not int and kind is not _INT64 and not self.action_space.contains(action):
             raise _invalid(action)
         if action == 1:
@@ -247,7 +248,7 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], int]):
             self.render()
         return state.astype(np.float32), {}
 
-    def render(self) -> npt.NDArray[np.uint8] | None:  # type: ignore[override]
+    def render(self) -> npt.NDArray[np.uint8] | None:
         """Draw the current state.
 
         Returns:

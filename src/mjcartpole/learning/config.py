@@ -4,16 +4,17 @@ One place for each number: the command line's flags and their help are derived f
 """
 
 import dataclasses
-import math
 from dataclasses import dataclass
 from typing import Any, Final, get_args
 
 from mjcartpole import task
 from mjcartpole.envs.backend import Backend, check_backend
 from mjcartpole.errors import ConfigError
-from mjcartpole.learning.discretizer import Discretizer
+from mjcartpole.learning.discretizer import Discretizer, is_finite
 from mjcartpole.learning.qlearning import Ties
 from mjcartpole.physics.integrator import Integrator
+
+DIMENSIONS: Final = ("x", "x_dot", "theta", "theta_dot")
 
 # The article's ranges, as its code has them: the float32 bound of the angle, and 3.5 rad/s.
 _ARTICLE_THETA = float(task.observation_bound()[2])
@@ -85,11 +86,15 @@ class TrainConfig:
     """Episodes per row of the printed table."""
 
     def __post_init__(self) -> None:
+        for name in ("bins", "low", "high"):
+            object.__setattr__(self, name, tuple(getattr(self, name)))
         check_backend(self.backend, self.model, self.integrator)
         self._check_counts()
         self._check_numbers()
-        if len(self.bins) != len(("x", "x_dot", "theta", "theta_dot")):
-            raise ConfigError(f"bins needs 4 values (x, x_dot, theta, theta_dot), not {self.bins}")
+        if len(self.bins) != len(DIMENSIONS):
+            raise ConfigError(
+                f"bins needs {len(DIMENSIONS)} values ({', '.join(DIMENSIONS)}), not {self.bins}"
+            )
         if self.ties not in get_args(Ties):
             raise ConfigError(f"ties must be 'first' or 'random', not {self.ties!r}")
         _ = self.discretizer
@@ -118,21 +123,21 @@ class TrainConfig:
     @property
     def discretizer(self) -> Discretizer:
         """The grid that the config describes."""
-        return Discretizer(tuple(self.bins), tuple(self.low), tuple(self.high))
+        return Discretizer(self.bins, self.low, self.high)
 
     def _check_counts(self) -> None:
         for name, least in (("episodes", 1), ("log_every", 1), ("seed", 0)):
             value = getattr(self, name)
-            if not isinstance(value, int) or value < least:
+            if type(value) is not int or value < least:
                 raise ConfigError(f"{name} must be a whole number from {least} up, not {value!r}")
 
     def _check_numbers(self) -> None:
         for name in ("gamma", "alpha", "alpha_final", "epsilon", "epsilon_final", "decay"):
             value = getattr(self, name)
-            if not 0 <= value <= 1:
-                raise ConfigError(f"{name} must lie between 0 and 1, not {value!r}")
-        start, end = self.q_init_low, self.q_init_high
-        if not (math.isfinite(start) and math.isfinite(end) and start <= end):
+            if not (is_finite(value) and 0 <= value <= 1):
+                raise ConfigError(f"{name} must be a number from 0 to 1, not {value!r}")
+        low, high = self.q_init_low, self.q_init_high
+        if not (is_finite(low) and is_finite(high) and low <= high):
             raise ConfigError(
-                f"q_init_low and q_init_high must be finite and in order, not {start} and {end}"
+                f"q_init_low and q_init_high must be finite and in order, not {low!r} and {high!r}"
             )

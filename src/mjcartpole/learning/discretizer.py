@@ -70,14 +70,20 @@ class Discretizer:
                 "bins, low and high need one value per dimension (x, x_dot, theta, theta_dot); "
                 f"found {len(self.bins)}, {len(self.low)} and {len(self.high)} values"
             )
-        if not all(isinstance(n, int) and n >= 1 for n in self.bins):
+        if not all(type(n) is int and n >= 1 for n in self.bins):
             raise ConfigError(f"bins must be whole numbers from 1 up, not {self.bins}")
         for low, high in zip(self.low, self.high, strict=True):
-            if not (math.isfinite(low) and math.isfinite(high) and low < high):
+            if not (is_finite(low) and is_finite(high) and low < high):
                 raise ConfigError(
-                    f"a dimension's range must be finite with low < high, not {low} to {high}"
+                    "a dimension's range must be two finite numbers with low < high, "
+                    f"not {low!r} to {high!r}"
                 )
         if self.n_states > MAX_STATES:
             raise ConfigError(
                 f"bins {self.bins} make {self.n_states} states; the most is {MAX_STATES}"
             )
+
+
+def is_finite(value: object) -> bool:
+    """Whether a value is a number, and neither infinite nor NaN."""
+    return isinstance(value, int | float) and math.isfinite(value)

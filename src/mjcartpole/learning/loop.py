@@ -20,7 +20,7 @@ State = npt.NDArray[np.float64]
 class Episode(NamedTuple):
     """What one episode came to."""
 
-    index: int
+    number: int
     total: float
     """Undiscounted return."""
     steps: int
@@ -51,10 +51,10 @@ def learn_episodes(
         episodes: How many.
         seed: Seeds the environment before the first episode; later ones go on from there.
     """
-    for index in range(episodes):
-        observation, _ = env.reset(seed=seed if index == 0 else None)
-        learner.begin_episode(index)
-        yield _learn_one(env, learner, discretizer, observation, index)
+    for number in range(episodes):
+        observation, _ = env.reset(seed=seed if number == 0 else None)
+        learner.begin_episode(number)
+        yield _learn_one(env, learner, discretizer, observation, number)
 
 
 def _learn_one(
@@ -62,7 +62,7 @@ def _learn_one(
     learner: TabularQ,
     discretizer: Discretizer,
     observation: npt.NDArray[np.float32],
-    index: int,
+    number: int,
 ) -> Episode:
     act, update, step = learner.act, learner.update, env.step
     learn_last_step = learner.learn_last_step
@@ -78,14 +78,14 @@ def _learn_one(
         total += float(r)
         steps += 1
         s = s_next
-    return Episode(index, total, steps, ending_of(terminated, _state_of(env)))
+    return Episode(number, total, steps, ending_of(terminated, _state_of(env)))
 
 
 def play_episode(
     env: gymnasium.Env[Any, Any],
     policy: Callable[[npt.NDArray[np.float32]], int],
     *,
-    index: int = 0,
+    number: int = 0,
     seed: int | None = None,
 ) -> tuple[Episode, list[State]]:
     """Play one episode without learning.
@@ -93,7 +93,7 @@ def play_episode(
     Args:
         env: The environment.
         policy: From an observation, float32 of shape (4,), to an action.
-        index: Number of the episode, for the record.
+        number: Number of the episode, for the record.
         seed: Seeds the environment if given.
 
     Returns:
@@ -107,7 +107,7 @@ def play_episode(
         over = terminated or truncated
         total += float(r)
         states.append(_state_of(env))
-    return Episode(index, total, len(states) - 1, ending_of(terminated, states[-1])), states
+    return Episode(number, total, len(states) - 1, ending_of(terminated, states[-1])), states
 
 
 def _state_of(env: gymnasium.Env[Any, Any]) -> State:

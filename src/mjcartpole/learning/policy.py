@@ -43,6 +43,8 @@ class Policy:
                 f"a table for bins {self.discretizer.bins} has shape {expected}, "
                 f"not {self.q_table.shape}"
             )
+        if not np.isfinite(self.q_table).all():
+            raise ConfigError("a table's values must be finite; this one has NaN or infinity in it")
         # The first maximum wins, as in numpy's argmax.
         actions = np.argmax(self.q_table.reshape(-1, N_ACTIONS), axis=1).tolist()
         object.__setattr__(self, "_actions", actions)
@@ -86,7 +88,7 @@ class Policy:
 
 
 def _to_text(policy: Policy) -> str:
-    content = {
+    content: dict[str, Any] = {
         "bins": list(policy.discretizer.bins),
         "low": list(policy.discretizer.low),
         "high": list(policy.discretizer.high),
@@ -106,7 +108,7 @@ def _from_text(text: str, path: str | os.PathLike[str]) -> Policy:
     except (ValueError, RecursionError) as error:
         raise _no_policy(path, "it is not JSON, or is cut off") from error
     if not isinstance(document, dict) or document.get("format") != FORMAT:
-        raise _no_policy(path, f"it lacks '\"format\": \"{FORMAT}\"'")
+        raise _no_policy(path, f'it lacks \'"format": "{FORMAT}"\'')
     if document.get("version") != VERSION:
         raise PolicyFileError(
             f"policy file '{path}' has version {document.get('version')}; "

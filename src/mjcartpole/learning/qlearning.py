@@ -61,7 +61,7 @@ class TabularQ:
         self._draw_ties = ties == "random"
         self._random: Callable[[], float] = rng.random
         # A flat memory view reads one float several times faster than the array does.
-        self._q = memoryview(q_table.reshape(-1))
+        self._q: memoryview[float] = q_table.reshape(-1).data.cast("B").cast("d")
 
     def begin_episode(self, episode: int) -> None:
         """Set step size and exploration for an episode, counted from 0."""

@@ -1,12 +1,12 @@
 """What a training leaves on disk.
 
-    runs/<name>/
-      config.json     the preset's name and the full config
-      versions.json   Python, the platform and the packages
-      model.xml       the model as it was, whole: it compiles to the same model anywhere
-      episodes.csv    one line per training episode
-      policy.json     the greedy policy (see policy.py)
-      summary.json    what came out; written last, so its presence means a complete run
+runs/<name>/
+config.json     the preset's name and the full config
+versions.json   Python, the platform and the packages
+model.xml       the model as it was, whole: it compiles to the same model anywhere
+episodes.csv    one line per training episode
+policy.json     the greedy policy (see policy.py)
+summary.json    what came out; written last, so its presence means a complete run
 """
 
 import csv
@@ -81,9 +81,7 @@ def claim_folder(folder: Path, *, overwrite: bool = False) -> None:
     if folder.is_dir():
         content = {path.name for path in folder.iterdir()}
         if content and not content & set(FILES):
-            raise RunError(
-                f"'{folder}' is a folder with other files in it, not a run; choose another --run-dir"
-            )
+            raise RunError(f"'{folder}' holds other files and is no run; choose another --run-dir")
         if content and not overwrite:
             raise RunError(
                 f"run folder '{folder}' exists; choose another --run-dir, or replace it with "
@@ -185,6 +183,6 @@ def _csv(episodes: tuple[Episode, ...]) -> str:
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(["episode", "return", "steps", "ending"])
     writer.writerows(
-        [episode.index + 1, episode.total, episode.steps, episode.ending] for episode in episodes
+        [episode.number + 1, episode.total, episode.steps, episode.ending] for episode in episodes
     )
     return text.getvalue()

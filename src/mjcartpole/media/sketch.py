@@ -100,8 +100,7 @@ class SketchRenderer:
             if not _meet(outline.bounds, box):
                 continue
             for colour, points in outline.polygons:
-                # Pillow counts from the centre of a pixel, the view from its corner.
-                corners = (points - (left, top)) * _OVERSAMPLING - 0.5
+                corners = (points - (left, top)) * _OVERSAMPLING
                 pen.polygon(corners.ravel().tolist(), fill=colour)
         return np.asarray(canvas.reduce(_OVERSAMPLING))
 

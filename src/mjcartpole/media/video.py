@@ -138,7 +138,10 @@ def _command(path: Path, shape: tuple[int, ...], fps: int) -> list[str]:
     source = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", str(fps)]
     # The colours are converted and labelled as BT.709, so that players need not guess.
     labels = "colorspace=bt709:color_primaries=bt709:color_trc=bt709:range=tv"
-    colours = ["-vf", f"scale=out_color_matrix=bt709:out_range=tv,format=yuv420p,setparams={labels}"]
+    colours = [
+        "-vf",
+        f"scale=out_color_matrix=bt709:out_range=tv,format=yuv420p,setparams={labels}",
+    ]
     codec = ["-c:v", "libx264", "-preset", "veryfast", "-crf", "18"]
     # faststart: the index comes first, so that a browser can play before it has all.
     target = ["-movflags", "+faststart", "-f", "mp4", str(path)]

@@ -8,6 +8,7 @@ import difflib
 import os
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeAlias
 from xml.etree import ElementTree
 
 import mujoco
@@ -16,7 +17,7 @@ import numpy as np
 from mjcartpole import task
 from mjcartpole.errors import ModelNotFoundError, ModelSyntaxError, NotACartPoleError
 
-ModelLike = str | os.PathLike[str] | mujoco.MjSpec
+ModelLike: TypeAlias = str | os.PathLike[str] | mujoco.MjSpec
 """What `load_model` takes: a name, a path, an XML document, or an MjSpec."""
 
 

@@ -43,8 +43,7 @@ class Simulation:
         self.integrator = integrator
         self._model = _stepping_model(cartpole.model, integrator)
         self.data = mujoco.MjData(self._model)
-        # Memory views read and write single floats several times faster than numpy arrays do.
-        self._qpos, self._qvel = memoryview(self.data.qpos), memoryview(self.data.qvel)
+        self._qpos, self._qvel = _floats(self.data.qpos), _floats(self.data.qvel)
         make_step = _explicit_euler if integrator == "gym" else _own_integrator
         self.step: Callable[[float], State] = make_step(self._model, self.data, cartpole)
 
@@ -89,10 +88,15 @@ def _stepping_model(model: mujoco.MjModel, integrator: Integrator) -> mujoco.MjM
     return stepped
 
 
+def _floats(array: npt.NDArray[np.float64]) -> "memoryview[float]":
+    """A view of MuJoCo's array that reads and writes single floats several times faster."""
+    return array.data.cast("B").cast("d")
+
+
 def _explicit_euler(
     model: mujoco.MjModel, data: mujoco.MjData, cartpole: CartPole
 ) -> Callable[[float], State]:
-    qpos, qvel, ctrl = memoryview(data.qpos), memoryview(data.qvel), memoryview(data.ctrl)
+    qpos, qvel, ctrl = _floats(data.qpos), _floats(data.qvel), _floats(data.ctrl)
     slider, hinge, substeps = cartpole.slider, cartpole.hinge, cartpole.substeps
     h = float(model.opt.timestep)
     mj_step = mujoco.mj_step
@@ -117,7 +121,7 @@ def _explicit_euler(
 def _own_integrator(
     model: mujoco.MjModel, data: mujoco.MjData, cartpole: CartPole
 ) -> Callable[[float], State]:
-    qpos, qvel, ctrl = memoryview(data.qpos), memoryview(data.qvel), memoryview(data.ctrl)
+    qpos, qvel, ctrl = _floats(data.qpos), _floats(data.qvel), _floats(data.ctrl)
     slider, hinge, substeps = cartpole.slider, cartpole.hinge, cartpole.substeps
     mj_step = mujoco.mj_step
 

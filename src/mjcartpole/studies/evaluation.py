@@ -83,8 +83,8 @@ def evaluate(
     check_count(episodes, seed)
     env = make_env(backend, model, integrator)
     played = tuple(
-        play_episode(env, policy, index=index, seed=seed if index == 0 else None)[0]
-        for index in range(episodes)
+        play_episode(env, policy, number=number, seed=seed if number == 0 else None)[0]
+        for number in range(episodes)
     )
     env.close()
     return Evaluation(backend, seed, played)

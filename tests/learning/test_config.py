@@ -1,0 +1,89 @@
+"""Configs that make sense, and those that do not."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+from mjcartpole.errors import ConfigError
+from mjcartpole.learning.config import PRESETS, TrainConfig
+
+
+def test_the_default_is_tuned():
+    assert TrainConfig.preset("tuned") == TrainConfig()
+    assert TrainConfig().episodes <= 2_000
+
+
+def test_the_article_as_printed():
+    config = TrainConfig.preset("article")
+    assert config.bins == (1, 1, 25, 25)
+    assert config.high[2] == float(np.float32(24 * 2 * math.pi / 360))
+    assert config.high[3] == 3.5
+    assert tuple(-value for value in config.low) == config.high
+    assert (config.gamma, config.alpha, config.alpha_final) == (0.95, 0.1, 0.1)
+    assert (config.epsilon, config.epsilon_final, config.decay) == (0.1, 0.0, 0.5)
+    assert (config.q_init_low, config.q_init_high) == (0.0, 1.0)
+    assert (config.episodes, config.log_every) == (12_000, 2_000)
+    assert config.learn_last_step is False
+    terminal = TrainConfig.preset("article-terminal")
+    assert dataclasses.replace(terminal, learn_last_step=False) == config
+
+
+def test_any_field_can_be_given():
+    config = TrainConfig.preset("article", backend="gym", seed=3, gamma=0.5)
+    assert (config.backend, config.seed, config.gamma) == ("gym", 3, 0.5)
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        config.seed = 4
+
+
+@pytest.mark.parametrize("name", list(PRESETS))
+def test_presets_name_fields_only(name):
+    assert set(PRESETS[name]) <= {field.name for field in dataclasses.fields(TrainConfig)}
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"backend": "bullet"}, "backend 'bullet' is unknown; available: mujoco, gym"),
+        ({"integrator": "rk4"}, "integrator 'rk4' is unknown"),
+        ({"backend": "gym", "model": "long"}, "takes no model or integrator"),
+        ({"episodes": 0}, "episodes must be a whole number from 1 up, not 0"),
+        ({"episodes": -5}, "not -5"),
+        ({"episodes": 2.5}, "whole number"),
+        ({"episodes": True}, "whole number"),
+        ({"log_every": 0}, "log_every"),
+        ({"seed": -1}, "seed must be a whole number from 0 up"),
+        ({"bins": (3, 3)}, "4 values"),
+        ({"bins": (1, 3, 6, 0)}, "from 1 up"),
+        ({"bins": (1, 3, 6, 8.5)}, "whole numbers"),
+        ({"low": (0.0, 0.0, 0.0)}, "one value per dimension"),
+        ({"low": (9.0, -1.0, -1.0, -1.0)}, "low < high"),
+        ({"high": (math.inf, 1.0, 1.0, 1.0)}, "finite"),
+        ({"high": ("a", 1.0, 1.0, 1.0)}, "finite numbers"),
+        ({"gamma": 1.5}, "gamma must be a number from 0 to 1"),
+        ({"gamma": math.nan}, "gamma"),
+        ({"alpha": -0.1}, "alpha"),
+        ({"epsilon": "much"}, "epsilon"),
+        ({"decay": 2}, "decay"),
+        ({"q_init_low": 2.0, "q_init_high": 1.0}, "in order"),
+        ({"q_init_high": math.inf}, "finite"),
+        ({"ties": "last"}, "ties must be"),
+    ],
+)
+def test_values_that_make_no_sense(changes, message):
+    with pytest.raises(ConfigError, match=message):
+        TrainConfig(**changes)
+
+
+def test_unknown_names_are_answered_with_those_that_are_there():
+    with pytest.raises(ConfigError, match=r"'best' is unknown; available: tuned, article"):
+        TrainConfig.preset("best")
+    with pytest.raises(ConfigError, match=r"no field gama; available: .*gamma"):
+        TrainConfig.preset("tuned", gama=0.9)
+
+
+def test_lists_are_taken_as_tuples():
+    config = TrainConfig(bins=[1, 3, 6, 8])
+    assert config == TrainConfig()
+    assert hash(config) == hash(TrainConfig())

@@ -1,0 +1,89 @@
+"""Every observation has a row, and the right one."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mjcartpole.errors import ConfigError
+from mjcartpole.learning.config import TrainConfig
+from mjcartpole.learning.discretizer import Discretizer
+
+TUNED = TrainConfig().discretizer
+anything = st.floats(allow_nan=False)
+
+
+@pytest.mark.parametrize(
+    ("value", "column"),
+    [
+        (-1e300, 0),
+        (-math.inf, 0),
+        (-2.0, 0),
+        (-1.0, 0),
+        (math.nextafter(-0.5, -1), 0),
+        (-0.5, 1),
+        (-0.0, 2),
+        (0.0, 2),
+        (0.5, 3),
+        (math.nextafter(1.0, 0), 3),
+        (1.0, 3),
+        (math.inf, 3),
+    ],
+)
+def test_bins_are_half_open_and_the_edge_bins_take_the_rest(value, column):
+    assert Discretizer((4,), (-1.0,), (1.0,))([value]) == column
+
+
+@given(st.lists(anything, min_size=4, max_size=4))
+def test_nothing_indexes_outside(values):
+    assert 0 <= TUNED(values) < TUNED.n_states == 144
+
+
+@given(
+    st.tuples(*[st.integers(1, 7)] * 4),
+    st.lists(st.floats(-3, 3), min_size=4, max_size=4),
+)
+def test_rows_are_counted_as_in_a_c_ordered_array(bins, values):
+    discretizer = Discretizer(bins, (-1.0, -2.0, -0.3, -1.5), (1.0, 2.0, 0.2, 2.5))
+    columns = [
+        min(n - 1, max(0, math.floor((value - low) / ((high - low) / n))))
+        for n, value, low, high in zip(bins, values, discretizer.low, discretizer.high, strict=True)
+    ]
+    assert discretizer(values) == np.ravel_multi_index(columns, bins)
+
+
+def test_one_bin_ignores_a_dimension():
+    assert TUNED([-99.0, 0.1, 0.1, 0.1]) == TUNED([99.0, 0.1, 0.1, 0.1])
+
+
+def test_the_articles_grid():
+    """`((state + range) / width).astype(int)`, as its code has it, inside the ranges."""
+    discretizer = TrainConfig.preset("article").discretizer
+    ranges = np.array([float(np.float32(math.radians(24))), 3.5])
+    width = ranges * 2 / [25, 25]
+    rng = np.random.default_rng(0)
+    for theta, theta_dot in rng.uniform(-ranges, ranges, size=(500, 2)):
+        row, column = ((np.array([theta, theta_dot]) + ranges) / width).astype(int)
+        assert discretizer([0.0, 0.0, theta, theta_dot]) == row * 25 + column
+
+
+@pytest.mark.parametrize(
+    ("bins", "low", "high", "message"),
+    [
+        ((0,), (-1.0,), (1.0,), "from 1 up"),
+        ((-3,), (-1.0,), (1.0,), "from 1 up"),
+        ((2.5,), (-1.0,), (1.0,), "whole numbers"),
+        ((3,), (1.0,), (1.0,), "low < high"),
+        ((3,), (1.0,), (-1.0,), "low < high"),
+        ((3,), (-math.inf,), (1.0,), "finite"),
+        ((3,), (math.nan,), (1.0,), "finite"),
+        ((3,), ("a",), (1.0,), "finite"),
+        ((3, 3), (-1.0,), (1.0,), "one value per dimension"),
+        ((1001, 1000), (-1.0, -1.0), (1.0, 1.0), "1001000 states"),
+    ],
+)
+def test_grids_that_make_no_sense(bins, low, high, message):
+    with pytest.raises(ConfigError, match=message):
+        Discretizer(bins, low, high)

@@ -1,0 +1,147 @@
+"""The reference loop against the same thing written out."""
+
+from itertools import pairwise
+
+import gymnasium
+import numpy as np
+import pytest
+
+from mjcartpole import task
+from mjcartpole.envs.backend import make_env
+from mjcartpole.learning.config import PRESETS, TrainConfig
+from mjcartpole.learning.discretizer import Discretizer
+from mjcartpole.learning.loop import ending_of, learn_episodes, play_episode
+from mjcartpole.learning.training import Training
+
+
+@pytest.mark.parametrize(
+    ("terminated", "x", "ending"),
+    [
+        (False, 2.4, "time limit"),
+        (True, 2.41, "off the track"),
+        (True, -2.41, "off the track"),
+        (True, 2.4, "pole fell"),
+        (True, 0.0, "pole fell"),
+    ],
+)
+def test_endings(terminated, x, ending):
+    assert ending_of(terminated, np.array([x, 0.0, 0.3, 0.0])) == ending
+
+
+def test_playing_records_every_state_from_first_to_last():
+    env = make_env("mujoco")
+    episode, states = play_episode(env, lambda observation: 1, seed=4)
+    assert episode.steps == len(states) - 1 == episode.total
+    first, _ = env.reset(seed=4)
+    np.testing.assert_array_equal(states[0].astype(np.float32), first)
+    for state, following in pairwise(states):
+        assert not task.has_terminated(state[0], state[2])
+        # Explicit Euler: the new position is the old one and the old velocity.
+        assert following[0] == state[0] + 0.02 * state[1]
+    assert task.has_terminated(states[-1][0], states[-1][2])
+
+
+def articles_code(episodes, seed, *, terminal):
+    """The article's loop as printed, but for the generator, the clipping and gymnasium's API."""
+    config = TrainConfig.preset("article", backend="gym", seed=seed, episodes=episodes)
+    env = gymnasium.make("CartPole-v1")
+    rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(1,)))
+    ranges = np.array([float(env.observation_space.high[2]), 3.5])
+    width = ranges * 2 / 25
+    table = rng.uniform(0, 1, size=(25 * 25, 2)).reshape(25, 25, 2)
+    returns = []
+
+    def cell(state):
+        trimmed = state[2:].astype(np.float64)
+        return tuple(np.clip(np.floor((trimmed + ranges) / width), 0, 24).astype(int))
+
+    for episode in range(episodes):
+        epsilon = 0.1 * (1 - min(1, episode / (episodes / 2)))
+        state, _ = env.reset(seed=seed if episode == 0 else None)
+        s, done, total = cell(state), False, 0.0
+        while not done:
+            action = int(rng.random() * 2) if rng.random() < epsilon else int(np.argmax(table[s]))
+            state, reward, terminated, truncated, _ = env.step(action)
+            done, s_next = terminated or truncated, cell(state)
+            if not done:
+                new = reward + 0.95 * np.max(table[s_next])
+                table[s][action] = 0.9 * table[s][action] + 0.1 * new
+            elif terminal and terminated:
+                table[s][action] = 0.9 * table[s][action] + 0.1 * reward
+            total += reward
+            s = s_next
+        returns.append(total)
+    return config, table, returns
+
+
+@pytest.mark.parametrize("preset", ["article", "article-terminal"])
+def test_the_article_presets_do_what_the_articles_code_does(preset):
+    terminal = preset == "article-terminal"
+    config, table, returns = articles_code(150, seed=5, terminal=terminal)
+    config = TrainConfig(
+        **{**PRESETS[preset], "backend": "gym", "seed": 5, "episodes": config.episodes}
+    )
+    training = Training(config)
+    ours = [episode.total for episode in training.run()]
+    assert ours == returns
+    # (1 - a) q + a t and q + a (t - q) round differently: equal to the last digits only.
+    np.testing.assert_allclose(training.result().q_table[0, 0], table, rtol=1e-12)
+
+
+class Recorder:
+    """Stands in for a learner, pushes to the right, and keeps what it is taught."""
+
+    def __init__(self, learn_last_step):
+        self.learn_last_step = learn_last_step
+        self.taught = []
+
+    def begin_episode(self, episode):
+        self.taught.append([])
+
+    def act(self, s):
+        return 1
+
+    def update(self, s, a, r, s_next, terminated):
+        self.taught[-1].append((s, a, r, s_next, terminated))
+
+
+class ThreeSteps(gymnasium.Env):
+    """Ends after three steps, by its rules or by a time limit."""
+
+    observation_space = gymnasium.spaces.Box(-10, 10, (1,), dtype=np.float32)
+    action_space = gymnasium.spaces.Discrete(2)
+
+    def __init__(self, terminates):
+        self.terminates = terminates
+
+    @property
+    def state(self):
+        return np.array([self.count, 0.0, 0.0, 0.0])
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        self.count = 0
+        return np.array([0], np.float32), {}
+
+    def step(self, action):
+        self.count += 1
+        over = self.count == 3
+        observation = np.array([self.count], np.float32)
+        return observation, 1.0, over and self.terminates, over and not self.terminates, {}
+
+
+@pytest.mark.parametrize("terminates", [True, False])
+@pytest.mark.parametrize("learn_last_step", [True, False])
+def test_what_the_last_step_teaches(terminates, learn_last_step):
+    learner = Recorder(learn_last_step)
+    grid = Discretizer((4,), (0.0,), (4.0,))
+    env = ThreeSteps(terminates)
+    episodes = list(learn_episodes(env, learner, grid, episodes=2, seed=0))
+    steps = [(0, 1, 1.0, 1, False), (1, 1, 1.0, 2, False)]
+    # Truncated is not terminated: the learner may bootstrap.
+    last = [(2, 1, 1.0, 3, terminates)] if learn_last_step else []
+    assert learner.taught == [steps + last] * 2
+    assert [(episode.number, episode.total, episode.steps) for episode in episodes] == [
+        (0, 3.0, 3),
+        (1, 3.0, 3),
+    ]

@@ -1,0 +1,61 @@
+"""The update and the choice, by known answers."""
+
+import numpy as np
+import pytest
+
+from mjcartpole.learning.qlearning import TabularQ
+from mjcartpole.learning.schedules import LinearSchedule
+
+
+def learner(table, *, alpha=0.5, epsilon=0.0, gamma=0.9, ties="first", seed=0):
+    return TabularQ(
+        np.array(table, dtype=np.float64),
+        gamma=gamma,
+        alpha=LinearSchedule(alpha, 0.0, 10),
+        epsilon=LinearSchedule(epsilon, 0.0, 10),
+        ties=ties,
+        learn_last_step=True,
+        rng=np.random.default_rng(seed),
+    )
+
+
+def test_one_update():
+    q = learner([[1.0, 2.0], [3.0, 4.0]])
+    q.update(0, 1, 1.0, 1, terminated=False)
+    # 2 + 0.5 (1 + 0.9 · 4 - 2) = 3.3
+    assert q.q_table.tolist() == [[1.0, pytest.approx(3.3)], [3.0, 4.0]]
+
+
+def test_a_terminated_step_has_no_future():
+    q = learner([[1.0, 2.0], [3.0, 4.0]])
+    q.update(0, 1, 1.0, 1, terminated=True)
+    assert q.q_table[0, 1] == 1.5
+
+
+def test_greedy_takes_the_better_action_and_the_first_of_equals():
+    q = learner([[1.0, 2.0], [2.0, 1.0], [1.0, 1.0]])
+    assert [q.act(s) for s in (0, 1, 2)] == [1, 0, 0]
+
+
+def test_random_ties_are_drawn_from_the_learners_own_generator():
+    def draw(seed):
+        q = learner([[1.0, 1.0]], ties="random", seed=seed)
+        return [q.act(0) for _ in range(200)]
+
+    assert 60 < sum(draw(0)) < 140
+    assert draw(0) == draw(0) != draw(1)
+
+
+def test_exploration_has_the_probability_of_epsilon():
+    q = learner([[0.0, 1.0]], epsilon=0.5)
+    share = np.mean([q.act(0) == 0 for _ in range(20_000)])
+    # A random action is the worse one half of the time; 5 standard deviations of 0.0031.
+    assert abs(share - 0.25) < 0.016
+
+
+def test_schedules_follow_the_episode():
+    q = learner([[0.0, 0.0]], alpha=0.5, epsilon=1.0)
+    q.begin_episode(5)
+    assert (q.alpha, q.epsilon) == (0.25, 0.5)
+    q.begin_episode(50)
+    assert (q.alpha, q.epsilon) == (0.0, 0.0)
