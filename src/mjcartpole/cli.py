@@ -168,7 +168,10 @@ def parse(argv: Sequence[str]) -> Command:
     except SystemExit as stop:
         if not stop.code:
             raise
-        raise UsageError(_one_line(complaint.getvalue())) from None
+        command_name = f" {argv[0]}" if argv[0] in ("train", "evaluate", "render") else ""
+        raise UsageError(
+            f"{_one_line(complaint.getvalue())}; see mjcartpole{command_name} --help"
+        ) from None
     return command
 
 
@@ -183,11 +186,14 @@ def _preset_in(argv: Sequence[str]) -> str:
 
 
 def _one_line(complaint: str) -> str:
-    """A tyro error box as one line: its message, and what it thinks was meant."""
-    lines = [line.strip("│╭╮╰╯─ \n") for line in complaint.splitlines()[1:]]
-    blocks = [block.split("\n") for block in "\n".join(lines).split("\n\n")]
-    message = " ".join(line for line in blocks[0] if line)
-    for block in blocks[1:]:
+    """A tyro error box as one line: its message, and what it thinks was meant.
+
+    The first line is a title; rules of dashes separate the message from what follows.
+    """
+    lines = [line.strip("│╭╮╰╯ ") for line in complaint.splitlines()[1:]]
+    text = "\n".join("" if set(line) <= {"─", "-"} else line for line in lines)
+    message, *others = [block.splitlines() for block in text.strip().split("\n\n")]
+    for block in others:
         if block[0].startswith("Perhaps you meant") and len(block) > 1:
-            message += f"; perhaps you meant {block[1]}"
-    return f"{message}; see mjcartpole --help"
+            return f"{' '.join(message)}; perhaps you meant {block[1]}"
+    return " ".join(message).rstrip(".")

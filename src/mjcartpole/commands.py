@@ -116,7 +116,9 @@ def _train_with_progress(training: Training) -> bool:
         TextColumn("episodes, mean return {task.fields[mean]:5.1f}"),
         TimeRemainingColumn(),
     )
-    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+    console = Console(stderr=True)
+    quiet = not console.is_terminal
+    with Progress(*columns, console=console, transient=True, disable=quiet) as progress:
         bar = progress.add_task("", total=training.config.episodes, mean=0.0)
         try:
             for episode in training.run():
@@ -156,14 +158,14 @@ def _set_stage(source: Path, choice: Choice) -> Stage:
     """Find a policy, and where to play it: as it was trained, unless the user chose otherwise."""
     seed = evaluation.SEED if choice.seed is None else choice.seed
     check_count(1, seed)
-    if source.is_dir() or not source.suffix:
+    if source.is_file():
+        name, policy = source.stem, Policy.load(source)
+        backend, integrator, model = "mujoco", "gym", "cartpole"
+    else:
         run = runs.load_run(source)
         name, policy = run.folder.resolve().name, run.policy
         backend, integrator = run.config.backend, run.config.integrator
         model = str(run.model)
-    else:
-        name, policy = source.stem, Policy.load(source)
-        backend, integrator, model = "mujoco", "gym", "cartpole"
     backend = choice.backend or backend
     if backend == "gym":
         # Gymnasium's cart-pole has neither; only what the user asks for is held against that.

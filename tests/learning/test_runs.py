@@ -89,7 +89,7 @@ def test_a_missing_file_is_named(run, name):
 
 
 def test_a_folder_that_is_not_there(tmp_path):
-    with pytest.raises(RunError, match="is not there"):
+    with pytest.raises(RunError, match="no run folder or policy file"):
         runs.load_run(tmp_path / "nothing")
 
 

@@ -60,7 +60,8 @@ def test_every_shape_covers_its_area(geom, area):
         area = math.pi * 0.3**2 * math.cos(math.pi / 4) + 0.6 * 0.2 * math.sin(math.pi / 4)
     frame = draw(shapes(f"<geom {geom} {RED}/>"))
     covered = frame[..., 0].sum() / 255 / 100**2
-    assert covered == pytest.approx(area, rel=0.03)
+    # Pillow counts a polygon's border as inside: a quarter of a pixel all around.
+    assert covered == pytest.approx(area, rel=0.04)
     assert (frame[..., 1:] == 0).all()
 
 

@@ -144,7 +144,7 @@ def load_run(folder: str | os.PathLike[str]) -> Run:
     """
     path = Path(folder)
     if not path.is_dir():
-        raise RunError(f"run folder '{path}' is not there; `mjcartpole train` makes one")
+        raise RunError(f"no run folder or policy file '{path}'; `mjcartpole train` makes a run")
     missing = [name for name in (CONFIG, MODEL, POLICY) if not (path / name).is_file()]
     if missing:
         raise RunError(f"'{path}' is no complete run folder: {', '.join(missing)} missing")

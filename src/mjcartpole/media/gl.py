@@ -40,8 +40,7 @@ _PROBE: Final = """
 import importlib, os, mujoco
 context = importlib.import_module("mujoco." + {module!r}).GLContext(16, 16)
 context.make_current()
-xml = '<mujoco><visual><global offwidth="16" offheight="16"/></visual></mujoco>'
-xml = xml.replace("<global", '<quality shadowsize="0" offsamples="0"/><global')
+xml = '<mujoco><visual><quality shadowsize="0" offsamples="0"/></visual></mujoco>'
 drawing = mujoco.MjrContext(mujoco.MjModel.from_xml_string(xml), 50)
 mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, drawing)
 os._exit(0 if drawing.currentBuffer == mujoco.mjtFramebuffer.mjFB_OFFSCREEN else 3)
@@ -198,13 +197,14 @@ def _has_library(backend: Backend) -> bool:
     if backend not in _LIBRARIES:
         return True
     name, file = _LIBRARIES[backend]
-    for candidate in (file, ctypes.util.find_library(name)):
-        try:
-            if candidate and ctypes.CDLL(candidate):
-                return True
-        except OSError:
-            continue
-    return False
+    return _can_load(file) or _can_load(ctypes.util.find_library(name))
+
+
+def _can_load(library: str | None) -> bool:
+    try:
+        return library is not None and bool(ctypes.CDLL(library))
+    except OSError:
+        return False
 
 
 def _module_name(backend: Backend) -> str:

@@ -29,7 +29,9 @@ _GIF_COLOURS: Final = 64
 _SHORTEST_GIF_FRAME: Final = 2
 
 
-def write_video(path: str | os.PathLike[str], frames: Iterable[Frame], *, fps: int = 50) -> int:
+def write_video(
+    path: str | os.PathLike[str], frames: Iterable[Frame], *, fps: int = DEFAULT_FPS
+) -> int:
     """Write frames as a video: H.264 for `.mp4`, an endless loop for `.gif`.
 
     The file appears when it is complete; if anything goes wrong, what was there stays.
@@ -175,7 +177,7 @@ def _write_gif(path: Path, frames: Iterator[Frame], fps: int) -> int:
         for frame in frames:
             count += 1
             image = Image.fromarray(frame)
-            # One palette for all: no flicker, and a smaller file.
+            # The first frame's palette for all: no flicker, a smaller file, and one pass.
             palette = palette or image.quantize(_GIF_COLOURS, dither=Image.Dither.NONE)
             yield image.quantize(palette=palette, dither=Image.Dither.NONE)
 

@@ -100,9 +100,9 @@ def find_model(source: str | os.PathLike[str]) -> Path:
         return shipped
     names = model_names()
     close = difflib.get_close_matches(str(source), names, n=1)
-    hint = f"; did you mean '{close[0]}'?" if close else ""
+    hint = f", did you mean '{close[0]}'?" if close else ""
     raise ModelNotFoundError(
-        f"no model is called '{source}'{hint} available: {', '.join(names)} "
+        f"no model is called '{source}'{hint}; available: {', '.join(names)} "
         "(or give the path of a file that ends in .xml)"
     )
 

@@ -1,0 +1,275 @@
+"""The command line as a person uses it: real processes where that matters."""
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from mjcartpole import cli
+from mjcartpole.errors import ConfigError
+from mjcartpole.learning.config import TrainConfig
+from mjcartpole.learning.policy import Policy
+from mjcartpole.learning.training import train
+from mjcartpole.physics.model import load_model
+
+QUICK = ["--episodes", "30", "--no-video"]
+
+
+def call(arguments, capsys):
+    """Run a command in this process; returns exit code, stdout and stderr."""
+    with pytest.raises(SystemExit) as stop:
+        cli.main([str(argument) for argument in arguments])
+    captured = capsys.readouterr()
+    return stop.value.code, captured.out, captured.err
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def run(here, capsys):
+    code, *_ = call(["train", *QUICK, "--seed", "3", "--run-dir", "runs/mine"], capsys)
+    assert code == 0
+    return here / "runs" / "mine"
+
+
+def test_flags_are_the_fields_of_the_config():
+    command = cli.parse(["train", "--gamma", "0.9", "--bins", "1", "1", "2", "3", "--seed=4"])
+    assert command.config == TrainConfig(gamma=0.9, bins=(1, 1, 2, 3), seed=4)
+    assert command.preset == "tuned"
+    assert command.video is True
+
+
+@pytest.mark.parametrize("form", [["--preset", "article"], ["--preset=article"]])
+def test_a_preset_changes_the_defaults(form):
+    command = cli.parse(["train", "--backend", "gym", *form, "--episodes", "50"])
+    assert command.config == TrainConfig.preset("article", backend="gym", episodes=50)
+    assert command.preset == "article"
+
+
+def test_negative_numbers_are_values():
+    command = cli.parse(["train", "--low", "-1", "-2.5", "-0.3", "-4e0"])
+    assert command.config.low == (-1.0, -2.5, -0.3, -4.0)
+
+
+def test_a_value_that_makes_no_sense_is_our_error():
+    with pytest.raises(ConfigError, match="gamma must be a number from 0 to 1, not 2"):
+        cli.parse(["train", "--gamma", "2"])
+
+
+def test_training_leaves_a_complete_run_and_its_evaluation_repeats(run, capsys):
+    code, out, err = call(["evaluate", "runs/mine"], capsys)
+    assert (code, err) == (0, "")
+    summary = json.loads((run / "summary.json").read_text())
+    assert f"mean return {summary['evaluation']['mean']:.2f}" in out
+    assert sum(int(count) for count in re.findall(r"^  .*?(\d+)$", out, re.M)[1:]) == 100
+    code, out, _ = call(["evaluate", "runs/mine", "--json"], capsys)
+    assert json.loads(out).items() >= summary["evaluation"].items()
+    policy = train(TrainConfig(episodes=30, seed=3)).policy
+    assert Policy.load(run / "policy.json").q_table.tobytes() == policy.q_table.tobytes()
+
+
+def test_what_training_prints(here, capsys):
+    code, out, err = call(["train", "--episodes", "25", "--log-every", "10", "--no-video"], capsys)
+    assert (code, err) == (0, "")
+    assert re.search(r"^tuned on mujoco: 25 episodes, seed 0$", out, re.M)
+    returns = train(TrainConfig(episodes=25)).returns
+    for end, block in ((10, returns[:10]), (20, returns[10:20]), (25, returns[20:])):
+        assert re.search(rf"^\s+{end}\s+{block.mean():.1f}$", out, re.M)
+    assert "run    runs/tuned-mujoco-seed0" in out
+    assert (here / "runs" / "tuned-mujoco-seed0" / "summary.json").is_file()
+    assert not (here / "videos").exists()
+
+
+def test_a_second_training_takes_the_next_free_folder(here, capsys):
+    for name in ("tuned-gym-seed0", "tuned-gym-seed0-2"):
+        assert call(["train", "--backend", "gym", *QUICK], capsys)[0] == 0
+        assert (here / "runs" / name / "policy.json").is_file()
+
+
+def test_an_existing_run_is_only_overwritten_on_request(run, capsys):
+    before = {path.name: path.read_bytes() for path in run.iterdir()}
+    again = ["train", *QUICK, "--seed", "4", "--run-dir", "runs/mine"]
+    code, _, err = call(again, capsys)
+    assert (code, err.count("\n")) == (2, 1)
+    assert "--overwrite" in err
+    assert {path.name: path.read_bytes() for path in run.iterdir()} == before
+    assert call([*again, "--overwrite"], capsys)[0] == 0
+    assert json.loads((run / "summary.json").read_text())["seed"] == 4
+
+
+def test_a_run_is_evaluated_where_it_was_trained_unless_told_otherwise(run, capsys):
+    out = {}
+    for backend in ("mujoco", "gym"):
+        code, text, _ = call(["evaluate", run, "--backend", backend, "--json"], capsys)
+        out[backend] = json.loads(text)
+        assert code == 0
+    assert [out[name]["backend"] for name in out] == ["mujoco", "gym"]
+    # Thirty episodes teach little: all episodes are too short for rounding to matter.
+    assert out["mujoco"]["mean"] == out["gym"]["mean"]
+
+
+def test_a_run_keeps_the_model_that_it_was_trained_on(here, capsys):
+    (here / "heavy.xml").write_text(load_model().xml.replace('mass="0.1"', 'mass="0.2"'))
+    train_it = ["train", *QUICK, "--model", "heavy.xml", "--run-dir", "runs/heavy"]
+    assert call(train_it, capsys)[0] == 0
+    stored = (here / "runs/heavy/model.xml").read_text()
+    assert stored == (here / "heavy.xml").read_text()
+    (here / "heavy.xml").unlink()
+    code, out, _ = call(["evaluate", "runs/heavy", "--json", "--episodes", "5"], capsys)
+    assert code == 0
+    assert json.loads(out)["model"] == str(here.joinpath("runs/heavy/model.xml").relative_to(here))
+
+
+def test_a_policy_file_alone_can_be_played(run, capsys):
+    code, out, _ = call(["evaluate", run / "policy.json", "--episodes", "3", "--seed", "1"], capsys)
+    assert code == 0
+    assert "3 episodes, seed 1" in out
+
+
+def frames_of(path):
+    import imageio_ffmpeg
+
+    return imageio_ffmpeg.count_frames_and_secs(str(path))
+
+
+@pytest.mark.parametrize("backend", ["mujoco", "gym"])
+def test_rendering_either_backend(run, backend, capsys):
+    arguments = ["render", run, "-o", "out.mp4", "--backend", backend, "--seed", "2"]
+    code, out, err = call(arguments, capsys)
+    assert (code, err) == (0, "")
+    steps = int(re.search(r"\((\d+) steps", out)[1])
+    frames, seconds = frames_of("out.mp4")
+    assert frames == steps + 1
+    assert seconds == pytest.approx(frames / 50, abs=0.011)
+
+
+def test_training_films_its_first_evaluation_episode(here, capsys):
+    code, out, _ = call(["train", "--episodes", "5", "--run-dir", "runs/film"], capsys)
+    assert code == 0
+    assert "video  videos/film.mp4" in out
+    summary = json.loads((here / "runs/film/summary.json").read_text())
+    assert summary["video"] == "videos/film.mp4"
+    assert frames_of(here / "videos/film.mp4")[0] > 5
+
+
+BAD = [
+    (["train", "--preset", "best"], "preset 'best' is unknown; available: tuned"),
+    (["train", "--episodes", "0"], "episodes must be a whole number from 1 up, not 0"),
+    (["train", "--episodes", "-7"], "not -7"),
+    (["train", "--episodes", "many"], "many"),
+    (["train", "--bins", "1", "2"], "bins needs 4 values"),
+    (["train", "--bins", "1", "2", "3", "0"], "from 1 up"),
+    (["train", "--bins", "1000", "1000", "1000", "1000"], "states; the most is"),
+    (["train", "--low", "5", "5", "5", "5"], "low < high"),
+    (["train", "--high", "nan", "1", "1", "1"], "finite"),
+    (["train", "--alpha", "7"], "alpha must be a number from 0 to 1"),
+    (["train", "--seed", "-1"], "seed must be"),
+    (["train", "--backend", "bullet"], "'bullet'"),
+    (["train", "--backend", "gym", "--model", "other"], "takes no model"),
+    (["train", "--model", "cartpol"], "did you mean 'cartpole'"),
+    (["train", "--model", "nowhere.xml"], "'nowhere.xml' is not there"),
+    (["train", "--model", "broken.xml"], "line 3"),
+    (["train", "--model", "ball.xml"], "no hinge joint"),
+    (["train", "--run-dir", "/proc/nothing"], "cannot make the folder"),
+    (["train", "--run-dir", "full"], "holds other files"),
+    (["train", "--run-dir", "a-file"], "a-file"),
+    (["train", "--overwriet"], "perhaps you meant --overwrite"),
+    (["fly"], "fly"),
+    (["evaluate"], "RUN-OR-POLICY"),
+    (["evaluate", "nowhere"], "no run folder or policy file 'nowhere'"),
+    (["evaluate", "full"], "no complete run folder"),
+    (["evaluate", "a-file"], "not a policy"),
+    (["evaluate", "noise.json"], "not a policy"),
+    (["evaluate", "RUN", "--episodes", "0"], "episodes must be"),
+    (["evaluate", "RUN", "--seed", "-4"], "seed must be"),
+    (["evaluate", "RUN", "--backend", "gym", "--integrator", "mujoco"], "takes no model"),
+    (["render", "nowhere"], "nowhere"),
+    (["render", "RUN", "-o", "video.xyz"], "video.xyz"),
+    (["render", "RUN", "-o", "/proc/nothing/video.mp4"], "/proc/nothing"),
+    (["render", "RUN", "--camera", "moon"], "'moon'; available: side, follow"),
+    (["render", "RUN", "--width", "0"], "width"),
+    (["render", "RUN", "--height", "481"], "481"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "message"), BAD, ids=lambda value: str(value)[:50])
+def test_a_mistake_is_one_line_and_exit_code_2(run, arguments, message, here, capsys):
+    (here / "broken.xml").write_text("<mujoco>\n<worldbody>\n<geom sise='1'/></worldbody></mujoco>")
+    text = load_model().xml.replace('type="hinge" axis="0 1 0"', 'type="ball"')
+    (here / "ball.xml").write_text(text)
+    (here / "full").mkdir()
+    (here / "full" / "thesis.tex").write_text("years of work")
+    (here / "a-file").write_text("text")
+    (here / "noise.json").write_bytes(os.urandom(200))
+    before = {path: path.read_bytes() for path in here.rglob("*") if path.is_file()}
+    code, out, err = call([str(run) if a == "RUN" else a for a in arguments], capsys)
+    assert code == 2
+    assert out == ""
+    assert err.startswith("mjcartpole: error: ")
+    assert err.count("\n") == 1
+    assert message in err
+    assert {path: path.read_bytes() for path in here.rglob("*") if path.is_file()} == before
+
+
+def test_an_unwritable_videos_folder_is_noticed_before_training(here, capsys):
+    (here / "videos").write_text("a file in the way")
+    code, out, err = call(["train"], capsys)
+    assert (code, out) == (2, "")
+    assert "videos" in err
+    assert not list(here.glob("runs/*/*"))
+
+
+def start(arguments, here):
+    command = [sys.executable, "-m", "mjcartpole", *arguments]
+    return subprocess.Popen(
+        command, cwd=here, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+
+
+def test_ctrl_c_ends_at_once_and_keeps_what_was_learned(here, capsys):
+    process = start(["train", "--episodes", "1000000", "--run-dir", "runs/long"], here)
+    assert "1,000,000 episodes" in process.stdout.readline()
+    time.sleep(1)
+    process.send_signal(signal.SIGINT)
+    sent = time.monotonic()
+    _, err = process.communicate(timeout=30)
+    # A second on a quiet machine; a busy one is given more.
+    assert time.monotonic() - sent < 10
+    assert process.returncode == 130
+    assert err.count("\n") == 1
+    assert re.search(r"interrupted after [\d,]+ of 1,000,000 episodes; .* kept in runs/long", err)
+    summary = json.loads((here / "runs/long/summary.json").read_text())
+    assert summary["interrupted"] is True
+    assert summary["episodes"] > 0
+    assert call(["evaluate", "runs/long", "--episodes", "2"], capsys)[0] == 0
+
+
+def test_module_and_version(here):
+    process = start(["--version"], here)
+    out, err = process.communicate(timeout=60)
+    assert re.fullmatch(r"mjcartpole \d+\.\d+\.\d+\n", out)
+    assert (process.returncode, err) == (0, "")
+
+
+def test_a_reader_that_leaves_early_is_no_error(here):
+    process = start(["train", *QUICK], here)
+    process.stdout.close()
+    assert "Traceback" not in process.stderr.read()
+    process.stderr.close()
+    assert process.wait(timeout=60) == 0
+
+
+@pytest.mark.parametrize("command", [[], ["--help"], ["train", "--help"], ["evaluate", "-h"]])
+def test_help(command, capsys):
+    code, out, _ = call(command, capsys)
+    assert code == 0
+    assert "usage: mjcartpole" in out
