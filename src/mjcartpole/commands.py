@@ -158,6 +158,8 @@ def _set_stage(source: Path, choice: Choice) -> Stage:
     """Find a policy, and where to play it: as it was trained, unless the user chose otherwise."""
     seed = evaluation.SEED if choice.seed is None else choice.seed
     check_count(1, seed)
+    backend: Backend
+    integrator: Integrator
     if source.is_file():
         name, policy = source.stem, Policy.load(source)
         backend, integrator, model = "mujoco", "gym", "cartpole"
