@@ -253,6 +253,17 @@ def test_ctrl_c_ends_at_once_and_keeps_what_was_learned(here, capsys):
     assert call(["evaluate", "runs/long", "--episodes", "2"], capsys)[0] == 0
 
 
+def test_a_model_that_diverges_is_one_line_as_well(here):
+    text = load_model().xml.replace('mass="1.0"', 'mass="1e-12"')
+    (here / "wild.xml").write_text(text.replace('gear="10"', 'gear="1e12"'))
+    process = start(["train", "--model", "wild.xml", "--no-video"], here)
+    _, err = process.communicate(timeout=60)
+    assert process.returncode == 2
+    assert err.count("\n") == 1
+    assert "the simulation of wild.xml diverged" in err
+    assert not (here / "MUJOCO_LOG.TXT").exists()
+
+
 def test_module_and_version(here):
     process = start(["--version"], here)
     out, err = process.communicate(timeout=60)

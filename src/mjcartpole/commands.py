@@ -21,6 +21,7 @@ from mjcartpole.media.renderer import open_renderer
 from mjcartpole.media.video import write_video
 from mjcartpole.physics.integrator import Integrator
 from mjcartpole.physics.model import load_model
+from mjcartpole.physics.simulation import silence_mujoco
 from mjcartpole.studies import evaluation
 from mjcartpole.studies.evaluation import Evaluation, check_count, evaluate
 
@@ -57,17 +58,18 @@ def run_train(
     config: TrainConfig, *, preset: str, run_dir: Path | None, video: bool, overwrite: bool
 ) -> int:
     """Train, evaluate, film; print what came out. Returns the exit code."""
+    silence_mujoco()
     training = Training(config)
     cartpole = load_model(config.model)
     runs.check_storable(cartpole)
     folder = run_dir or runs.free_folder(RUNS, f"{preset}-{config.backend}-seed{config.seed}")
-    runs.claim_folder(folder, overwrite=overwrite)
     if video:
         check_writable(make_folder(VIDEOS))
-    print(f"{preset} on {config.backend}: {config.episodes:,} episodes, seed {config.seed}")
-    interrupted = _train_with_progress(training)
-    result = training.result()
-    runs.write_run(folder, result, cartpole, preset=preset)
+    with runs.claimed_folder(folder, overwrite=overwrite):
+        print(f"{preset} on {config.backend}: {config.episodes:,} episodes, seed {config.seed}")
+        interrupted = _train_with_progress(training)
+        result = training.result()
+        runs.write_run(folder, result, cartpole, preset=preset)
     summary = _summary(result, preset=preset, interrupted=interrupted)
     runs.write_summary(folder, summary)
     _print_learning(result)
@@ -156,6 +158,7 @@ def _show_result(
 
 def _set_stage(source: Path, choice: Choice) -> Stage:
     """Find a policy, and where to play it: as it was trained, unless the user chose otherwise."""
+    silence_mujoco()
     seed = evaluation.SEED if choice.seed is None else choice.seed
     check_count(1, seed)
     backend: Backend

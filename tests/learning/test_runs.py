@@ -20,9 +20,9 @@ def result():
 @pytest.fixture
 def run(result, tmp_path):
     folder = tmp_path / "run"
-    runs.claim_folder(folder)
-    runs.write_run(folder, result, load_model(), preset="article")
-    runs.write_summary(folder, {"episodes": 12})
+    with runs.claimed_folder(folder):
+        runs.write_run(folder, result, load_model(), preset="article")
+        runs.write_summary(folder, {"episodes": 12})
     return folder
 
 
@@ -49,11 +49,16 @@ def test_the_versions_are_named(run):
     assert {"python", "platform", "mjcartpole", "mujoco", "gymnasium", "numpy"} <= set(versions)
 
 
+def claim(folder, **options):
+    with runs.claimed_folder(folder, **options):
+        pass
+
+
 def test_a_run_is_not_overwritten_by_accident(run):
     before = {path.name: path.read_bytes() for path in run.iterdir()}
     with pytest.raises(RunError, match=r"exists; choose another --run-dir, or .* --overwrite"):
-        runs.claim_folder(run)
-    runs.claim_folder(run, overwrite=True)
+        claim(run)
+    claim(run, overwrite=True)
     assert {path.name: path.read_bytes() for path in run.iterdir()} == before
 
 
@@ -61,17 +66,19 @@ def test_a_folder_with_other_files_is_never_taken(tmp_path):
     (tmp_path / "thesis.tex").write_text("years of work")
     for overwrite in (False, True):
         with pytest.raises(RunError, match="holds other files"):
-            runs.claim_folder(tmp_path, overwrite=overwrite)
+            claim(tmp_path, overwrite=overwrite)
 
 
-def test_an_empty_folder_is_taken(tmp_path):
-    runs.claim_folder(tmp_path)
+def test_an_empty_folder_is_taken_and_goes_again_if_nothing_came_of_it(tmp_path):
+    (tmp_path / "empty").mkdir()
+    claim(tmp_path / "empty")
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_file_in_the_way(tmp_path):
     (tmp_path / "run").write_text("")
     with pytest.raises(FileError):
-        runs.claim_folder(tmp_path / "run")
+        claim(tmp_path / "run")
 
 
 def test_free_folders_are_counted(tmp_path):

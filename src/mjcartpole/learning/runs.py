@@ -9,12 +9,14 @@ policy.json     the greedy policy (see policy.py)
 summary.json    what came out; written last, so its presence means a complete run
 """
 
+import contextlib
 import csv
 import dataclasses
 import io
 import json
 import os
 import platform
+from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
@@ -66,8 +68,11 @@ def free_folder(parent: Path, name: str) -> Path:
     return folder
 
 
-def claim_folder(folder: Path, *, overwrite: bool = False) -> None:
+@contextlib.contextmanager
+def claimed_folder(folder: Path, *, overwrite: bool = False) -> Iterator[None]:
     """Make a run folder before the work begins, so that no training is lost for want of one.
+
+    If the work fails and has left nothing in it, the folder goes again.
 
     Args:
         folder: The run folder. An empty one is taken; one that holds a run needs `overwrite`.
@@ -89,6 +94,11 @@ def claim_folder(folder: Path, *, overwrite: bool = False) -> None:
             )
     make_folder(folder)
     check_writable(folder)
+    try:
+        yield
+    finally:
+        if not any(folder.iterdir()):
+            folder.rmdir()
 
 
 def check_storable(cartpole: CartPole) -> None:

@@ -133,6 +133,15 @@ def _own_integrator(
     return step
 
 
+def silence_mujoco() -> None:
+    """Keep MuJoCo from printing warnings and from writing MUJOCO_LOG.TXT where a program runs.
+
+    For programs, not for libraries: it holds for the whole process. Nothing is lost here, since a
+    diverging simulation is a `SimulationError`.
+    """
+    mujoco.set_mju_user_warning(lambda message: None)
+
+
 def check_sane(state: State, model_name: str) -> None:
     """Raise if a simulation has diverged.
 
