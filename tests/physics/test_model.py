@@ -8,11 +8,13 @@ import pytest
 
 from mjcartpole.errors import ModelNotFoundError, ModelSyntaxError, NotACartPoleError
 from mjcartpole.physics.model import (
+    INTEGRATORS,
     load_model,
     model_names,
     models_folder,
     same_model,
     self_contained,
+    with_options,
 )
 
 REFERENCE = (models_folder() / "cartpole.xml").read_text(encoding="utf-8")
@@ -168,3 +170,25 @@ def test_includes_are_put_in_their_place(tmp_path):
 def test_includes_in_an_ill_formed_document_are_refused(tmp_path):
     with pytest.raises(ModelSyntaxError, match="cannot be put together"):
         self_contained('<mujoco><!-- a -- b --><include file="x"/></mujoco>', tmp_path)
+
+
+def test_integrators_are_numbered_as_in_mujoco():
+    for number, name in enumerate(INTEGRATORS):
+        assert mujoco.mjtIntegrator(number).name == f"mjINT_{name.upper()}"
+        cartpole = load_model(changed('integrator="Euler"', f'integrator="{name}"'))
+        assert cartpole.integrator == name
+        assert with_options(load_model(), integrator=name).integrator == name
+
+
+def test_the_files_own_timestep_on_request():
+    text = changed('timestep="0.02"', 'timestep="0.013"')
+    cartpole = load_model(text, own_timestep=True)
+    assert (cartpole.substeps, cartpole.timestep) == (1, 0.013)
+    assert load_model(cartpole) is cartpole
+
+
+def test_options_are_changed_in_a_copy():
+    cartpole = load_model()
+    finer = with_options(cartpole, timestep=0.001)
+    assert (finer.timestep, cartpole.timestep) == (0.001, 0.02)
+    assert finer.xml == cartpole.xml

@@ -3,8 +3,9 @@
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
+import gymnasium
 import numpy as np
 import numpy.typing as npt
 
@@ -58,14 +59,18 @@ class Training:
     Iterating `run()` does the work; `result()` says what has been learned so far.
     """
 
-    def __init__(self, config: TrainConfig) -> None:
+    def __init__(self, config: TrainConfig, env: gymnasium.Env[Any, Any] | None = None) -> None:
         """Make the environment and the learner.
+
+        Args:
+            config: What to train.
+            env: Trains here instead of on the config's own environment.
 
         Raises:
             ModelError: The model cannot be used.
         """
         self.config = config
-        self.env = make_env(config.backend, config.model, config.integrator)
+        self.env = env or make_env(config.backend, config.model, config.integrator)
         self.learner = _make_learner(config)
         self.episodes: list[Episode] = []
         self._seconds = 0.0

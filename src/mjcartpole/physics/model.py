@@ -4,6 +4,8 @@ A cart-pole is one slide joint (the cart's), one hinge joint below it (the pole'
 actuator that pushes along the slider. Names do not matter; structure does.
 """
 
+import copy
+import dataclasses
 import difflib
 import os
 from dataclasses import dataclass
@@ -17,8 +19,8 @@ import numpy as np
 from mjcartpole import task
 from mjcartpole.errors import ModelNotFoundError, ModelSyntaxError, NotACartPoleError
 
-ModelLike: TypeAlias = str | os.PathLike[str] | mujoco.MjSpec
-"""What `load_model` takes: a name, a path, an XML document, or an MjSpec."""
+INTEGRATORS = ("Euler", "RK4", "implicit", "implicitfast")
+"""As MJCF spells them, in the order of MuJoCo's mjtIntegrator."""
 
 
 @dataclass(frozen=True)
@@ -43,6 +45,20 @@ class CartPole:
     controls: tuple[float, float]
     substeps: int
 
+    @property
+    def timestep(self) -> float:
+        """Seconds of one physics step."""
+        return float(self.model.opt.timestep)
+
+    @property
+    def integrator(self) -> str:
+        """The integrator that the file names, as MJCF spells it (see `INTEGRATORS`)."""
+        return INTEGRATORS[int(self.model.opt.integrator)]
+
+
+ModelLike: TypeAlias = str | os.PathLike[str] | mujoco.MjSpec | CartPole
+"""What `load_model` takes: a name, a path, an XML document, an MjSpec, or a loaded cart-pole."""
+
 
 def models_folder() -> Path:
     """The folder of the models that come with the package.
@@ -59,25 +75,52 @@ def model_names() -> list[str]:
     return sorted(path.stem for path in models_folder().glob("*.xml"))
 
 
-def load_model(source: ModelLike = "cartpole") -> CartPole:
+def load_model(source: ModelLike = "cartpole", *, own_timestep: bool = False) -> CartPole:
     """Load a cart-pole.
 
     Args:
         source: The name of a shipped model (`"cartpole"`), the path of an MJCF file, an MJCF
-            document as text (it starts with `<`), or an `mujoco.MjSpec`.
+            document as text (it starts with `<`), or an `mujoco.MjSpec`. A loaded cart-pole is
+            returned as it is.
+        own_timestep: Let a control step be one physics step of the file, however long, instead of
+            as many as fill CartPole-v1's 0.02 s.
 
     Raises:
         ModelNotFoundError: There is no such name or file.
         ModelSyntaxError: MuJoCo does not accept the document.
         NotACartPoleError: It compiles, but is no cart-pole.
     """
+    if isinstance(source, CartPole):
+        return source
     if isinstance(source, mujoco.MjSpec):
-        return _from_spec(source)
+        return _find_parts(*_from_spec(source), own_timestep)
     if isinstance(source, str) and source.lstrip().startswith("<"):
-        return _find_parts("the XML document", source, _compile(source, "the XML document"))
+        name = "the XML document"
+        return _find_parts(name, source, _compile(source, name), own_timestep)
     path = find_model(source)
     name = path.stem if path.parent == models_folder() else str(source)
-    return _from_file(name, path)
+    return _find_parts(name, *_from_file(path), own_timestep)
+
+
+def with_options(
+    cartpole: CartPole, *, timestep: float | None = None, integrator: str | None = None
+) -> CartPole:
+    """The same cart-pole with another timestep or integrator, one physics step per control step.
+
+    For studies of integrators; the document stays as it was. Options are no geometry: changing
+    them in a compiled model leaves no derived value stale.
+
+    Args:
+        cartpole: The cart-pole.
+        timestep: Seconds.
+        integrator: As MJCF spells it: Euler, RK4, implicit or implicitfast.
+    """
+    model = copy.copy(cartpole.model)
+    if timestep is not None:
+        model.opt.timestep = timestep
+    if integrator is not None:
+        model.opt.integrator = INTEGRATORS.index(integrator)
+    return dataclasses.replace(cartpole, model=model, substeps=1)
 
 
 def find_model(source: str | os.PathLike[str]) -> Path:
@@ -107,22 +150,24 @@ def find_model(source: str | os.PathLike[str]) -> Path:
     )
 
 
-def _from_file(name: str, path: Path) -> CartPole:
+def _from_file(path: Path) -> tuple[str, mujoco.MjModel]:
+    """The document, whole, and the compiled model."""
     try:
         text = path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         raise ModelNotFoundError(f"model file '{path}' cannot be read: {error}") from error
     model = _compile(text, str(path), path)
-    return _find_parts(name, self_contained(text, path.parent), model)
+    return self_contained(text, path.parent), model
 
 
-def _from_spec(spec: mujoco.MjSpec) -> CartPole:
+def _from_spec(spec: mujoco.MjSpec) -> tuple[str, str, mujoco.MjModel]:
+    """Its name, the document and the compiled model."""
     try:
         model = spec.compile()
     except (ValueError, mujoco.FatalError) as error:
         raise ModelSyntaxError(f"the MjSpec does not compile: {_one_line(error)}") from error
     # MuJoCo writes numbers with six digits: this text is for reading, `model` is what runs.
-    return _find_parts(spec.modelname or "the MjSpec", spec.to_xml(), model)
+    return spec.modelname or "the MjSpec", spec.to_xml(), model
 
 
 def _compile(text: str, name: str, path: Path | None = None) -> mujoco.MjModel:
@@ -180,7 +225,7 @@ def _expand_includes(parent: ElementTree.Element, folder: Path) -> None:
             _expand_includes(child, folder)
 
 
-def _find_parts(name: str, xml: str, model: mujoco.MjModel) -> CartPole:
+def _find_parts(name: str, xml: str, model: mujoco.MjModel, own_timestep: bool) -> CartPole:
     slider = _only_joint(name, model, mujoco.mjtJoint.mjJNT_SLIDE, "slide", "the cart's")
     hinge = _only_joint(name, model, mujoco.mjtJoint.mjJNT_HINGE, "hinge", "the pole's")
     if model.njnt != 2:
@@ -194,7 +239,7 @@ def _find_parts(name: str, xml: str, model: mujoco.MjModel) -> CartPole:
         slider=slider,
         hinge=hinge,
         controls=_controls(name, model, slider),
-        substeps=_substeps(name, model),
+        substeps=1 if own_timestep else _substeps(name, model),
     )
 
 

@@ -72,6 +72,46 @@ class Simulation:
         self._qpos[slider], self._qvel[slider] = x, x_dot
         self._qpos[hinge], self._qvel[hinge] = theta, theta_dot
 
+    def steps(
+        self, states: npt.NDArray[np.float64], controls: npt.NDArray[np.float64]
+    ) -> npt.NDArray[np.float64]:
+        """One control step from each of many states.
+
+        Args:
+            states: Shape (n, 4).
+            controls: Shape (n,).
+
+        Returns:
+            The states afterwards, shape (n, 4).
+        """
+        after = np.empty_like(states)
+        for index, (state, control) in enumerate(zip(states, controls.tolist(), strict=True)):
+            self.state = state
+            after[index] = self.step(control)
+        return after
+
+    def accelerations(
+        self, states: npt.NDArray[np.float64], controls: npt.NDArray[np.float64]
+    ) -> npt.NDArray[np.float64]:
+        """MuJoCo's accelerations in each of many states.
+
+        Args:
+            states: Shape (n, 4).
+            controls: Shape (n,).
+
+        Returns:
+            `(x_acc, theta_acc)`, shape (n, 2): m/s^2, rad/s^2.
+        """
+        model, data = self._model, self.data
+        where = [self.cartpole.slider, self.cartpole.hinge]
+        found = np.empty((len(states), 2))
+        for index, (state, control) in enumerate(zip(states, controls.tolist(), strict=True)):
+            self.state = state
+            data.ctrl[0] = control
+            mujoco.mj_forward(model, data)
+            found[index] = data.qacc[where]
+        return found
+
 
 def _stepping_model(model: mujoco.MjModel, integrator: Integrator) -> mujoco.MjModel:
     """The model as it is stepped; options are no geometry, so changing them leaves no value stale.

@@ -1,0 +1,78 @@
+"""Which parameter would explain what was measured?"""
+
+import dataclasses
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import numpy.typing as npt
+
+from mjcartpole.physics import equations
+from mjcartpole.physics.equations import Parameters
+from mjcartpole.physics.integrator import Integrator
+from mjcartpole.physics.parameters import differences
+from mjcartpole.studies.parity.subject import Subject, Vector
+
+_NUDGE = 1e-6
+"""Relative change by which a parameter's effect is measured."""
+
+
+def likely_cause(
+    subject: Subject,
+    integrator: Integrator,
+    states: Vector,
+    actions: npt.NDArray[np.intp],
+    found: Vector,
+) -> str:
+    """The one parameter that best explains wrong steps, in words.
+
+    Where the model's own parameters differ from the reference, each difference is tried alone.
+    Where they do not (the model is right and the steps are wrong all the same), the parameter
+    is fitted whose change would come closest.
+
+    Args:
+        subject: What is examined.
+        integrator: Which integrator made the steps.
+        states: Before the steps, shape (n, 4).
+        actions: Shape (n,).
+        found: After the steps, shape (n, 4).
+    """
+
+    def steps(p: Parameters) -> Vector:
+        return equations.step(p, states, np.array(p.forces)[actions], integrator)
+
+    reference = subject.reference
+    base = steps(reference)
+    error = found - base
+    if not np.isfinite(error).all():
+        return "likely cause: none can be named, since the steps are not finite"
+    candidates = list(_own_differences(subject.own, reference)) or list(
+        _fitted(reference, steps, base, error)
+    )
+    if not candidates:
+        return "likely cause: " + ("; ".join(subject.causes) or "not in the model's parameters")
+    total = float(np.sum(error**2))
+    shares = [1 - float(np.sum((found - steps(p)) ** 2)) / total for _, p in candidates]
+    best = int(np.argmax(shares))
+    return f"likely cause: {candidates[best][0]} (explains {max(shares[best], 0):.1%} of it)"
+
+
+def _own_differences(own: Parameters, reference: Parameters) -> Iterator[tuple[str, Parameters]]:
+    """The reference with one of the model's own parameters at a time."""
+    for field in dataclasses.fields(Parameters):
+        changed = dataclasses.replace(reference, **{field.name: getattr(own, field.name)})
+        if phrases := differences(changed, reference):
+            yield "; ".join(phrases), changed
+
+
+def _fitted(
+    reference: Parameters, steps: Callable[[Parameters], Vector], base: Vector, error: Vector
+) -> Iterator[tuple[str, Parameters]]:
+    """The reference with one parameter at a time moved by least squares."""
+    for name in ("cart_mass", "pole_mass", "com_distance", "inertia", "gravity", "timestep"):
+        value = getattr(reference, name)
+        nudged = dataclasses.replace(reference, **{name: value * (1 + _NUDGE)})
+        effect = (steps(nudged) - base) / (value * _NUDGE)
+        change = float(np.sum(effect * error) / np.sum(effect**2))
+        if value + change > 0:
+            moved = dataclasses.replace(reference, **{name: value + change})
+            yield "; ".join(differences(moved, reference)) or f"{name} as it is", moved

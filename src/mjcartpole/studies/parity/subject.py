@@ -1,0 +1,161 @@
+"""The model under examination, and what it is held against."""
+
+import dataclasses
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Literal
+
+import gymnasium
+import numpy as np
+import numpy.typing as npt
+
+from mjcartpole.envs.backend import GYM_ID
+from mjcartpole.envs.registration import ENV_ID
+from mjcartpole.learning.config import TrainConfig
+from mjcartpole.learning.policy import Policy
+from mjcartpole.learning.training import Training
+from mjcartpole.physics.equations import CARTPOLE_V1, Parameters
+from mjcartpole.physics.integrator import Integrator
+from mjcartpole.physics.model import CartPole
+from mjcartpole.physics.parameters import (
+    beyond_equations,
+    beyond_step,
+    differences,
+    overridden_masses,
+    read_parameters,
+)
+from mjcartpole.physics.simulation import Simulation
+
+Against = Literal["cartpole-v1", "itself"]
+
+KINEMATICS: dict[Integrator, str] = {"gym": "euler", "mujoco": "semi-implicit"}
+"""What gymnasium calls our integrators."""
+
+Vector = npt.NDArray[np.float64]
+
+# Enough to stay up for a while, not always: episodes then differ in length and ending.
+_POLICY = TrainConfig.preset("tuned", episodes=250, seed=1)
+
+
+@dataclass(frozen=True)
+class Subject:
+    """A model, the question asked of it, and the witnesses.
+
+    Attributes:
+        cartpole: The model; load it with its own timestep if that does not divide 0.02 s.
+        against: Which question: see the package.
+        quick: Whether to take fewer samples.
+        seed: Seeds every draw.
+    """
+
+    cartpole: CartPole
+    against: Against = "cartpole-v1"
+    quick: bool = False
+    seed: int = 0
+
+    @cached_property
+    def own(self) -> Parameters:
+        """The model's own parameters, with the timestep of one control step."""
+        parameters = read_parameters(self.cartpole)
+        step = self.cartpole.timestep * self.cartpole.substeps
+        return dataclasses.replace(parameters, timestep=step)
+
+    @cached_property
+    def reference(self) -> Parameters:
+        """The parameters that the answers are held against."""
+        return CARTPOLE_V1 if self.against == "cartpole-v1" else self.own
+
+    @cached_property
+    def beyond(self) -> list[str]:
+        """What the model has that the equations do not cover."""
+        return beyond_equations(self.cartpole)
+
+    @cached_property
+    def beyond_step(self) -> list[str]:
+        """Why one step of the file's own integrator is not semi-implicit Euler."""
+        steps = self.cartpole.substeps
+        several = [f"{steps} physics steps per control step"] if steps > 1 else []
+        return several + beyond_step(self.cartpole)
+
+    @cached_property
+    def causes(self) -> list[str]:
+        """Everything by which the model's document differs from what it is held against."""
+        found = differences(self.own, self.reference) + self.beyond
+        if self.against == "cartpole-v1":
+            found += self.beyond_step + overridden_masses(self.cartpole)
+        return found
+
+    def rng(self, rung: int) -> np.random.Generator:
+        """A rung's own generator, so that rungs can be run alone with the same result."""
+        return np.random.default_rng([self.seed, rung])
+
+    def simulation(self, integrator: Integrator) -> Simulation:
+        """The model in motion."""
+        return Simulation(self.cartpole, integrator)
+
+    def ours(self, integrator: Integrator = "gym", **options: Any) -> gymnasium.Env[Any, Any]:  # noqa: ANN401
+        """Our environment with this model."""
+        arguments = {"model": self.cartpole, "integrator": integrator, **options}
+        return gymnasium.make(ENV_ID, disable_env_checker=True, **arguments)
+
+    def gyms(self, integrator: Integrator = "gym", **options: Any) -> gymnasium.Env[Any, Any]:  # noqa: ANN401
+        """Gymnasium's environment with the reference's parameters.
+
+        Raises:
+            ValueError: Its formula cannot express them; see `gym_cannot`.
+        """
+        env = gymnasium.make(GYM_ID, disable_env_checker=True, **options)
+        set_parameters(env, self.reference)
+        env.unwrapped.kinematics_integrator = KINEMATICS[integrator]  # type: ignore[attr-defined]
+        return env
+
+    @cached_property
+    def gym_cannot(self) -> str:
+        """Why gymnasium's formula cannot express the reference; empty if it can."""
+        return why_not_gymnasiums(self.reference)
+
+    @cached_property
+    def policy(self) -> Policy:
+        """A policy that has learned a little on this model."""
+        training = Training(_POLICY, env=self.ours())
+        for _ in training.run():
+            pass
+        return training.result().policy
+
+    def states(self, rung: int, n: int, box: npt.ArrayLike) -> tuple[Vector, npt.NDArray[np.intp]]:
+        """Random states within ±box, shape (n, 4), and actions, shape (n,)."""
+        rng, bound = self.rng(rung), np.asarray(box, dtype=np.float64)
+        return rng.uniform(-bound, bound, size=(n, 4)), rng.integers(2, size=n)
+
+
+def why_not_gymnasiums(p: Parameters) -> str:
+    """Why gymnasium's formula cannot express a cart-pole; empty if it can."""
+    uniform = p.pole_mass * p.com_distance**2 / 3
+    if abs(p.inertia - uniform) > 1e-12 * uniform or p.com_distance <= 0:
+        return "its pole is a uniform thin rod, and this one is not"
+    if p.slider_damping or p.hinge_damping or p.slider_armature or p.hinge_armature:
+        return "it knows neither damping nor armature"
+    if p.forces[0] != -p.forces[1] or p.hinge_sign != 1:
+        return "it pushes as hard to the left as to the right, and positive angles lean to the right"
+    return ""
+
+
+def set_parameters(env: gymnasium.Env[Any, Any], p: Parameters) -> None:
+    """Give gymnasium's CartPole-v1 other parameters, derived values included.
+
+    Gymnasium computes `total_mass` and `polemass_length` once, in its constructor: setting
+    `masscart` alone changes nothing.
+
+    Raises:
+        ValueError: Its formula cannot express them.
+    """
+    if why := why_not_gymnasiums(p):
+        raise ValueError(f"gymnasium's formula cannot express this cart-pole: {why}")
+    cartpole: Any = env.unwrapped
+    cartpole.gravity = p.gravity
+    cartpole.masscart, cartpole.masspole = p.cart_mass, p.pole_mass
+    cartpole.length = p.com_distance
+    cartpole.force_mag = p.forces[1]
+    cartpole.tau = p.timestep
+    cartpole.total_mass = cartpole.masspole + cartpole.masscart
+    cartpole.polemass_length = cartpole.masspole * cartpole.length
