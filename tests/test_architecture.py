@@ -11,7 +11,7 @@ import mjcartpole
 
 PACKAGE = Path(mjcartpole.__file__).parent
 LAYERS = ["errors", "task", "files", "physics", "media", "envs", "learning", "studies"]
-TOP = {"commands", "cli", "__main__", "__init__"}
+TOP = {"commands", "parity_command", "cli", "__main__", "__init__"}
 MUJOCO_HOMES = ("physics/", "media/", "envs/vector.py", "learning/kernels.py")
 
 SOURCES = sorted(PACKAGE.rglob("*.py"))

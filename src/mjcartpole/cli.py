@@ -11,7 +11,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, NoReturn
+from typing import Annotated, Literal, NoReturn
 
 import tyro
 
@@ -22,6 +22,10 @@ from mjcartpole.learning.config import TrainConfig
 from mjcartpole.physics.integrator import Integrator
 
 INTERRUPTED = 130
+COMMANDS = ("train", "evaluate", "render", "parity")
+
+
+Against = Literal["cartpole-v1", "itself"]
 
 
 @dataclass(frozen=True)
@@ -83,7 +87,23 @@ class Render:
     """Pixels."""
 
 
-Command = Train | Evaluate | Render
+@dataclass(frozen=True)
+class Parity:
+    """Hold MuJoCo against CartPole-v1, rung by rung."""
+
+    model: str = "cartpole"
+    """A shipped model's name or an MJCF file."""
+    against: Against = "cartpole-v1"
+    """cartpole-v1: is this model CartPole-v1? itself: does MuJoCo move it as its equations do?"""
+    rungs: tuple[int, ...] = tuple(range(1, 11))
+    """Which rungs of the ladder."""
+    quick: bool = False
+    """Fewer samples."""
+    json: Path | None = None
+    """Write every figure to this file."""
+
+
+Command = Train | Evaluate | Render | Parity
 
 
 class UsageError(MjCartPoleError):
@@ -139,6 +159,16 @@ def _run(argv: list[str]) -> int:
                 width=command.width,
                 height=command.height,
             )
+        case Parity():
+            from mjcartpole import parity_command  # noqa: PLC0415 - it imports SciPy
+
+            return parity_command.run_parity(
+                command.model,
+                against=command.against,
+                rungs=command.rungs,
+                quick=command.quick,
+                output=command.json,
+            )
 
 
 def parse(argv: Sequence[str]) -> Command:
@@ -155,6 +185,7 @@ def parse(argv: Sequence[str]) -> Command:
         Annotated[Train, tyro.conf.subcommand("train", default=train_default)]
         | Annotated[Evaluate, tyro.conf.subcommand("evaluate")]
         | Annotated[Render, tyro.conf.subcommand("render")]
+        | Annotated[Parity, tyro.conf.subcommand("parity")]
     )
     complaint = io.StringIO()
     try:
@@ -168,7 +199,7 @@ def parse(argv: Sequence[str]) -> Command:
     except SystemExit as stop:
         if not stop.code:
             raise
-        command_name = f" {argv[0]}" if argv[0] in ("train", "evaluate", "render") else ""
+        command_name = f" {argv[0]}" if argv[0] in COMMANDS else ""
         raise UsageError(
             f"{_one_line(complaint.getvalue())}; see mjcartpole{command_name} --help"
         ) from None

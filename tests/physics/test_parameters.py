@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mjcartpole.errors import ModelError
+from mjcartpole.physics.beyond import beyond_equations, beyond_step
 from mjcartpole.physics.equations import (
     CARTPOLE_V1,
     Parameters,
@@ -21,8 +22,6 @@ from mjcartpole.physics.equations import (
 )
 from mjcartpole.physics.model import load_model, model_names
 from mjcartpole.physics.parameters import (
-    beyond_equations,
-    beyond_step,
     differences,
     read_parameters,
 )

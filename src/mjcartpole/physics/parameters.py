@@ -1,7 +1,7 @@
-"""The parameters of the equations, read from a compiled model, and what the equations leave out.
+"""The parameters of the equations, read from a compiled model.
 
-`read_parameters` takes the file's numbers; `beyond_equations` names everything else that acts on
-the motion. Where the second is empty, MuJoCo and `equations` with the first must agree.
+`read_parameters` takes the file's numbers; `beyond.py` names everything else that acts on the
+motion.
 """
 
 from collections.abc import Iterator
@@ -19,7 +19,7 @@ from mjcartpole.physics.model import CartPole
 TILT: Final = 1e-14
 """Sine of an angle that rounding alone can leave between two axes; anything more is a tilt."""
 
-_UP: Final = np.array([0.0, 0.0, 1.0])
+UP: Final = np.array([0.0, 0.0, 1.0])
 
 Vector = npt.NDArray[np.float64]
 
@@ -36,9 +36,10 @@ def read_parameters(cartpole: CartPole) -> Parameters:
         ModelError: A number of the model makes no sense in the equations.
     """
     model, slider, hinge = cartpole.model, cartpole.slider, cartpole.hinge
-    pole, axes = _pole(model, hinge), _axes(cartpole)
+    pole, axes = pole_of(model, hinge), axes_of(cartpole)
     if pole.mass <= 0:
-        raise NotACartPoleError(f"{cartpole.name}: the pole, {_joint(model, hinge)}, has no mass")
+        name = joint_label(model, hinge)
+        raise NotACartPoleError(f"{cartpole.name}: the pole, {name}, has no mass")
     gear = float(model.actuator_gear[0, 0])
     try:
         return Parameters(
@@ -53,9 +54,9 @@ def read_parameters(cartpole: CartPole) -> Parameters:
                 model.dof_armature[slider] + gear**2 * model.actuator_armature[0]
             ),
             hinge_armature=float(model.dof_armature[hinge]),
-            forces=_forces(cartpole),
+            forces=forces_of(cartpole),
             timestep=float(model.opt.timestep),
-            hinge_sign=-1 if np.cross(axes.hinge, _UP) @ axes.slider < 0 else 1,
+            hinge_sign=-1 if np.cross(axes.hinge, UP) @ axes.slider < 0 else 1,
         )
     except ValueError as error:
         raise ModelError(f"{cartpole.name} is beyond the equations: {error}") from error
@@ -97,43 +98,6 @@ def _digits(value: float, other: float) -> str:
     return repr(value)
 
 
-def beyond_equations(cartpole: CartPole) -> list[str]:
-    """Everything in a model that acts on its motion and is not in the equations, by name.
-
-    What a flag of the file switches off, or what cannot act (a tendon without stiffness, the
-    reference angle of a pole that is upright at angle 0), is not listed. Contacts count where two
-    geoms may collide by MuJoCo's rules, wherever they are.
-
-    Returns:
-        One phrase each; empty if the equations cover the model.
-    """
-    found: list[str] = []
-    for look in (_directions, _joints, _actuator, _contacts, _ties, _surroundings, _switches):
-        found.extend(look(cartpole))
-    return found
-
-
-def beyond_step(cartpole: CartPole) -> list[str]:
-    """Why one step of the file's own integrator is not the semi-implicit `equations.step`.
-
-    Returns:
-        One phrase each; empty for MuJoCo's `Euler` with implicit damping and for `implicitfast`,
-        which leaves out what turns with the velocity and so is the same here.
-    """
-    model, names = cartpole.model, mujoco.mjtIntegrator
-    integrator, found = names(int(model.opt.integrator)), []
-    if integrator not in {names.mjINT_EULER, names.mjINT_IMPLICITFAST}:
-        found.append(f"integrator {integrator.name.removeprefix('mjINT_')} instead of Euler")
-    damped = model.dof_damping.any() or model.actuator_damping.any()
-    explicit = not _on(model, mujoco.mjtDisableBit.mjDSBL_EULERDAMP)
-    if integrator == names.mjINT_EULER and damped and explicit:
-        found.append("implicit damping (eulerdamp) switched off")
-    return found
-
-
-# --- the bodies ---------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True)
 class _Pole:
     """All bodies below the hinge as one; the frame is that of the hinge's body."""
@@ -152,7 +116,8 @@ class _Axes:
     pole_frame: Vector  # orientation of the hinge's body, shape (3, 3)
 
 
-def _axes(cartpole: CartPole) -> _Axes:
+def axes_of(cartpole: CartPole) -> _Axes:
+    """Where the joints point when both coordinates are 0."""
     model = cartpole.model
     data = mujoco.MjData(model)
     data.qpos[:] = 0.0  # angle 0, which a joint's `ref` can move away from the file's own pose
@@ -162,7 +127,7 @@ def _axes(cartpole: CartPole) -> _Axes:
     return _Axes(slider.copy(), hinge.copy(), frame.copy())
 
 
-def _pole(model: mujoco.MjModel, hinge: int) -> _Pole:
+def pole_of(model: mujoco.MjModel, hinge: int) -> _Pole:
     """The pole as one rigid body, by the parallel axis theorem.
 
     Positions are composed in the frame of the hinge's body, not taken from the world: there a
@@ -201,14 +166,15 @@ def _subtree(model: mujoco.MjModel, root: int) -> list[int]:
     return inside
 
 
-def _moving_bodies(cartpole: CartPole) -> list[int]:
+def moving_bodies(cartpole: CartPole) -> list[int]:
+    """Every body that slides, the pole's included."""
     return _subtree(cartpole.model, int(cartpole.model.jnt_bodyid[cartpole.slider]))
 
 
 def _cart_bodies(cartpole: CartPole) -> list[int]:
     model = cartpole.model
     pole = _subtree(model, int(model.jnt_bodyid[cartpole.hinge]))
-    return [body for body in _moving_bodies(cartpole) if body not in pole]
+    return [body for body in moving_bodies(cartpole) if body not in pole]
 
 
 def _mass(model: mujoco.MjModel, bodies: list[int]) -> float:
@@ -221,171 +187,20 @@ def _rotation(quaternion: Vector) -> Vector:
     return matrix.reshape(3, 3)
 
 
-def _forces(cartpole: CartPole) -> tuple[float, float]:
+def forces_of(cartpole: CartPole) -> tuple[float, float]:
+    """Push along the slider by action 0 and by action 1, N."""
     model = cartpole.model
     gear, gain = float(model.actuator_gear[0, 0]), float(model.actuator_gainprm[0, 0])
     left, right = cartpole.controls
     return gear * (gain * left), gear * (gain * right)
 
 
-# --- what the equations leave out ---------------------------------------------------------------
+def joint_label(model: mujoco.MjModel, index: int) -> str:
+    """A joint by its name, or by its number where it has none."""
+    return label(model, mujoco.mjtObj.mjOBJ_JOINT, index)
 
 
-def _directions(cartpole: CartPole) -> Iterator[str]:
-    """Tilted axes, and a pole that does not stand at angle 0."""
-    model, axes = cartpole.model, _axes(cartpole)
-    slider, hinge = _joint(model, cartpole.slider), _joint(model, cartpole.hinge)
-    if abs(axes.slider[2]) > TILT:
-        yield f"slide axis of {slider} is tilted, not horizontal"
-    if abs(axes.hinge[2]) > TILT:
-        yield f"hinge axis of {hinge} is tilted, not horizontal"
-    if abs(axes.hinge @ axes.slider) > TILT:
-        yield f"hinge axis of {hinge} is not perpendicular to the slide axis of {slider}"
-    same_body = model.jnt_bodyid[cartpole.slider] == model.jnt_bodyid[cartpole.hinge]
-    if same_body and cartpole.hinge < cartpole.slider:
-        yield f"slide axis of {slider} turns with the pole: {hinge} comes first in the same body"
-    com = axes.pole_frame @ _pole(model, cartpole.hinge).com
-    beside = float(com @ axes.slider)
-    if abs(beside) > TILT * np.abs(com).max():
-        ref = float(model.qpos0[cartpole.hinge])
-        reason = f" (its ref is {ref:g} rad)" if ref else ""
-        yield (
-            f"the pole's centre of mass is {abs(beside):.3g} m beside {hinge} at angle 0{reason}"
-        )
-
-
-def _joints(cartpole: CartPole) -> Iterator[str]:
-    """Limits, friction loss, springs and damping that is not viscous."""
-    model, bit = cartpole.model, mujoco.mjtDisableBit
-    solver = _on(model, bit.mjDSBL_CONSTRAINT)
-    for joint in (cartpole.slider, cartpole.hinge):
-        name = _joint(model, joint)
-        if model.jnt_limited[joint] and solver and _on(model, bit.mjDSBL_LIMIT):
-            low, high = model.jnt_range[joint]
-            yield f"limit of {name} at {low:g} and {high:g}"
-        if model.dof_frictionloss[joint] and solver and _on(model, bit.mjDSBL_FRICTIONLOSS):
-            yield f"friction loss in {name}"
-        spring = model.jnt_stiffness[joint] or model.jnt_stiffnesspoly[joint].any()
-        if spring and _on(model, bit.mjDSBL_SPRING):
-            yield f"spring (stiffness) in {name}"
-        if model.dof_dampingpoly[joint].any() and _on(model, bit.mjDSBL_DAMPER):
-            yield f"damping of {name} is not proportional to the velocity"
-
-
-def _actuator(cartpole: CartPole) -> Iterator[str]:
-    """Whatever makes the actuator more than a motor: force = gear * gain * control."""
-    model = cartpole.model
-    name = _named(model, mujoco.mjtObj.mjOBJ_ACTUATOR, 0)
-    if model.actuator_gaintype[0] != mujoco.mjtGain.mjGAIN_FIXED:
-        yield f"gain of {name} is not fixed"
-    if model.actuator_biastype[0] != mujoco.mjtBias.mjBIAS_NONE and model.actuator_biasprm.any():
-        yield f"bias (servo, velocity feedback) of {name}"
-    if model.actuator_dyntype[0] != mujoco.mjtDyn.mjDYN_NONE:
-        yield f"activation dynamics of {name}"
-    if model.actuator_delay[0] > 0:
-        yield f"delay of {name}"
-    if model.actuator_dampingpoly[0].any():
-        yield f"damping of {name} is not proportional to the velocity"
-    if model.opt.disableactuator >> int(model.actuator_group[0]) & 1:
-        yield f"{name} is in a disabled group"
-    forces = np.array(cartpole.controls) * model.actuator_gainprm[0, 0]
-    if model.actuator_forcelimited[0] and _clips(model.actuator_forcerange[0], forces):
-        yield f"force range of {name} clips its force"
-    slider, pushes = cartpole.slider, np.array(_forces(cartpole))
-    if model.jnt_actfrclimited[slider] and _clips(model.jnt_actfrcrange[slider], pushes):
-        yield f"actuator force range of {_joint(model, slider)} clips the force of {name}"
-
-
-def _clips(interval: Vector, forces: Vector) -> bool:
-    return bool((np.clip(forces, *interval) != forces).any())
-
-
-def _contacts(cartpole: CartPole) -> Iterator[str]:
-    """Pairs of geoms that may touch, by MuJoCo's filters; a fixed pair counts as it stands."""
-    model, bit = cartpole.model, mujoco.mjtDisableBit
-    if not (_on(model, bit.mjDSBL_CONTACT) and _on(model, bit.mjDSBL_CONSTRAINT)):
-        return
-    weld = model.body_weldid[model.geom_bodyid].tolist()
-    moves = np.isin(model.geom_bodyid, _moving_bodies(cartpole)).tolist()
-    explicit = set(zip(model.pair_geom1.tolist(), model.pair_geom2.tolist(), strict=True))
-    for a in range(model.ngeom):
-        for b in range(a + 1, model.ngeom):
-            if weld[a] == weld[b] or not (moves[a] or moves[b]):
-                continue
-            if {(a, b), (b, a)} & explicit or _may_collide(model, a, b):
-                names = [_named(model, mujoco.mjtObj.mjOBJ_GEOM, geom, "") for geom in (a, b)]
-                yield f"contact between geoms {' and '.join(names)}"
-
-
-def _may_collide(model: mujoco.MjModel, a: int, b: int) -> bool:
-    """MuJoCo's filter of two geoms on bodies that move apart: bit masks, parents, excludes."""
-    masks = model.geom_contype[a] & model.geom_conaffinity[b]
-    if not (masks or model.geom_contype[b] & model.geom_conaffinity[a]):
-        return False
-    bodies = sorted((int(model.geom_bodyid[a]), int(model.geom_bodyid[b])))
-    if (bodies[0] << 16) + bodies[1] in model.exclude_signature:
-        return False
-    weld = [int(model.body_weldid[body]) for body in bodies]
-    above = [int(model.body_weldid[model.body_parentid[body]]) for body in weld]
-    parent_filter = _on(model, mujoco.mjtDisableBit.mjDSBL_FILTERPARENT) and 0 not in weld
-    return not (parent_filter and (weld[0] == above[1] or weld[1] == above[0]))
-
-
-def _ties(cartpole: CartPole) -> Iterator[str]:
-    """Equality constraints, tendons, deformable things and plugins."""
-    model, bit = cartpole.model, mujoco.mjtDisableBit
-    if _on(model, bit.mjDSBL_EQUALITY) and _on(model, bit.mjDSBL_CONSTRAINT):
-        for index in np.flatnonzero(model.eq_active0).tolist():
-            yield f"equality constraint {_named(model, mujoco.mjtObj.mjOBJ_EQUALITY, index, '')}"
-    acting = ("stiffness", "stiffnesspoly", "damping", "dampingpoly", "frictionloss", "armature")
-    for tendon in range(model.ntendon):
-        values = [getattr(model, f"tendon_{name}")[tendon] for name in (*acting, "limited")]
-        if any(np.any(value) for value in values):
-            yield _named(model, mujoco.mjtObj.mjOBJ_TENDON, tendon)
-    for flex in range(model.nflex):
-        yield _named(model, mujoco.mjtObj.mjOBJ_FLEX, flex)
-    for plugin in sorted({*model.body_plugin.tolist(), *model.actuator_plugin.tolist()} - {-1}):
-        yield _named(model, mujoco.mjtObj.mjOBJ_PLUGIN, plugin)
-
-
-def _surroundings(cartpole: CartPole) -> Iterator[str]:
-    """Gravity that is not plain, and air or water."""
-    model = cartpole.model
-    gravity = model.opt.gravity
-    if np.abs(gravity[:2]).max() > TILT * abs(gravity[2]):
-        yield f"gravity is not vertical ({' '.join(f'{value:g}' for value in gravity)})"
-    for body in _moving_bodies(cartpole):
-        if model.body_gravcomp[body]:
-            yield f"gravity compensation of {_named(model, mujoco.mjtObj.mjOBJ_BODY, body)}"
-    for name in ("density", "viscosity"):
-        if getattr(model.opt, name):
-            wind = " and wind" if model.opt.wind.any() else ""
-            yield f"a fluid around it (option {name} {getattr(model.opt, name):g}{wind})"
-
-
-def _switches(cartpole: CartPole) -> Iterator[str]:
-    """Option flags that keep a part of the equations from acting."""
-    model, bit = cartpole.model, mujoco.mjtDisableBit
-    damped = model.dof_damping.any() or model.actuator_damping.any()
-    if model.opt.gravity.any() and not _on(model, bit.mjDSBL_GRAVITY):
-        yield "gravity is switched off (option flag)"
-    if damped and not _on(model, bit.mjDSBL_DAMPER):
-        yield "damping is switched off (option flag)"
-    if not _on(model, bit.mjDSBL_ACTUATION):
-        yield "actuation is switched off (option flag)"
-    if model.opt.enableflags & int(mujoco.mjtEnableBit.mjENBL_SLEEP):
-        yield "sleeping of what is at rest (option flag)"
-
-
-def _on(model: mujoco.MjModel, flag: mujoco.mjtDisableBit) -> bool:
-    return not model.opt.disableflags & int(flag)
-
-
-def _joint(model: mujoco.MjModel, index: int) -> str:
-    return _named(model, mujoco.mjtObj.mjOBJ_JOINT, index)
-
-
-def _named(model: mujoco.MjModel, kind: mujoco.mjtObj, index: int, word: str | None = None) -> str:
+def label(model: mujoco.MjModel, kind: mujoco.mjtObj, index: int, word: str | None = None) -> str:
     """How a person finds an element: "joint 'slider'", or "joint 0" if it has no name."""
     word = kind.name.removeprefix("mjOBJ_").lower() if word is None else word
     name = mujoco.mj_id2name(model, kind, index)

@@ -4,13 +4,12 @@ import dataclasses
 from collections.abc import Callable, Iterator
 
 import numpy as np
-import numpy.typing as npt
 
 from mjcartpole.physics import equations
 from mjcartpole.physics.equations import Parameters
 from mjcartpole.physics.integrator import Integrator
 from mjcartpole.physics.parameters import differences
-from mjcartpole.studies.parity.subject import Subject, Vector
+from mjcartpole.studies.parity.subject import Batch, Subject, Vector
 
 _NUDGE = 1e-6
 """Relative change by which a parameter's effect is measured."""
@@ -19,8 +18,7 @@ _NUDGE = 1e-6
 def likely_cause(
     subject: Subject,
     integrator: Integrator,
-    states: Vector,
-    actions: npt.NDArray[np.intp],
+    batch: Batch,
     found: Vector,
 ) -> str:
     """The one parameter that best explains wrong steps, in words.
@@ -32,13 +30,12 @@ def likely_cause(
     Args:
         subject: What is examined.
         integrator: Which integrator made the steps.
-        states: Before the steps, shape (n, 4).
-        actions: Shape (n,).
+        batch: Before the steps.
         found: After the steps, shape (n, 4).
     """
 
     def steps(p: Parameters) -> Vector:
-        return equations.step(p, states, np.array(p.forces)[actions], integrator)
+        return equations.step(p, batch.states, np.array(p.forces)[batch.actions], integrator)
 
     reference = subject.reference
     base = steps(reference)

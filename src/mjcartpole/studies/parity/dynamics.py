@@ -13,7 +13,7 @@ from mjcartpole.physics.equations import Parameters, coefficients
 from mjcartpole.physics.integrator import Integrator
 from mjcartpole.studies.parity.diagnosis import likely_cause
 from mjcartpole.studies.parity.result import Figure, Result
-from mjcartpole.studies.parity.subject import Subject, Vector
+from mjcartpole.studies.parity.subject import Batch, Subject, Vector
 
 EPS = float(np.finfo(np.float64).eps)
 
@@ -32,29 +32,21 @@ def accelerations(subject: Subject) -> Result:
         "times the condition of their mass matrix"
     )
     if subject.against == "itself" and subject.beyond:
-        return _beyond(2, title, reason, subject.beyond)
-    states, actions = subject.states(2, 10_000 if subject.quick else 100_000, WIDE_BOX)
-    controls = np.array(subject.cartpole.controls)[actions]
-    forces = np.array(subject.reference.forces)[actions]
-    found = subject.simulation("gym").accelerations(states, controls)
-    _, x_dot, theta, theta_dot = states.T
-    p = subject.reference
+        return beyond_result(2, title, reason, subject.beyond)
+    batch = subject.random_batch(2, 10_000 if subject.quick else 100_000, WIDE_BOX)
+    found = subject.simulation("gym").accelerations(batch.states, subject.controls(batch))
+    p, forces = subject.reference, subject.forces(batch)
+    _, x_dot, theta, theta_dot = batch.states.T
     expected = np.column_stack(equations.accelerations(p, x_dot, theta, theta_dot, forces))
-    unit = EPS * acceleration_scale(p, states, forces)
-    error = np.abs(found - expected) / unit
-    worst = int(np.nanargmax(error.max(axis=1)))
+    difference = np.abs(found - expected)
+    error = difference / (EPS * acceleration_scale(p, batch.states, forces))
     figures = (
-        Figure("largest error", _largest(error), ACCELERATION_BOUND, "eps of the terms"),
-        Figure("largest error, as it is", _largest(np.abs(found - expected)), None, "m/s², rad/s²"),
-        Figure("states", float(len(states))),
+        Figure("largest error", float(error.max()), ACCELERATION_BOUND, "eps of the terms"),
+        Figure("the same, m/s² or rad/s²", float(difference.max())),
+        Figure("states", float(len(error))),
     )
     problems = tuple(subject.causes)
-    story: tuple[str, ...] = ()
-    if problems or not figures[0].holds:
-        story = (
-            f"worst state {_numbers(states[worst])}, action {actions[worst]}",
-            f"MuJoCo {_numbers(found[worst])}, equations {_numbers(expected[worst])}",
-        )
+    story = () if figures[0].holds else _worst_case(batch, error, found, expected, "equations")
     return Result(2, title, reason, figures, problems, story)
 
 
@@ -97,7 +89,7 @@ def _one_step(subject: Subject, rung: int, integrator: Integrator, title: str) -
         if subject.cartpole.integrator == "RK4":
             beyond = subject.beyond
         if beyond:
-            return _beyond(rung, title, reason, beyond)
+            return beyond_result(rung, title, reason, beyond)
     rows = [_against_equations(subject, rung, integrator)]
     if not subject.gym_cannot:
         rows += _against_gymnasium(subject, rung, integrator)
@@ -111,14 +103,13 @@ Row = tuple[Figure, tuple[str, ...]]
 
 
 def _against_equations(subject: Subject, rung: int, integrator: Integrator) -> Row:
-    states, actions = subject.states(rung, 10_000 if subject.quick else 100_000, WIDE_BOX)
-    forces = np.array(subject.reference.forces)[actions]
-    p = subject.reference
+    batch = subject.random_batch(rung, 10_000 if subject.quick else 100_000, WIDE_BOX)
+    p, forces = subject.reference, subject.forces(batch)
     if integrator == "mujoco" and subject.cartpole.integrator == "RK4":
-        expected = equations.rk4_step(p, states, forces)
+        expected = equations.rk4_step(p, batch.states, forces)
     else:
-        expected = equations.step(p, states, forces, integrator)
-    return _compare(subject, integrator, "equations", states, actions, expected)
+        expected = equations.step(p, batch.states, forces, integrator)
+    return _compare(subject, integrator, "equations", batch, expected)
 
 
 def _against_gymnasium(subject: Subject, rung: int, integrator: Integrator) -> list[Row]:
@@ -126,24 +117,22 @@ def _against_gymnasium(subject: Subject, rung: int, integrator: Integrator) -> l
     n = 2_000 if subject.quick else 20_000
     env = subject.gyms(integrator)
     batches = {
-        "CartPole-v1, random states": subject.states(rung + 100, n, WIDE_BOX),
+        "CartPole-v1, random states": subject.random_batch(rung + 100, n, WIDE_BOX),
         "CartPole-v1, random actions": _along(subject, rung, n, _random(subject.rng(rung))),
         "CartPole-v1, learned actions": _along(subject, rung, n, subject.policy),
         "CartPole-v1, adversarial actions": _along(subject, rung, n, _adversarial),
     }
     return [
-        _compare(subject, integrator, name, states, actions, gym_steps(env, states, actions))
-        for name, (states, actions) in batches.items()
+        _compare(subject, integrator, name, batch, gym_steps(env, batch))
+        for name, batch in batches.items()
     ]
 
 
-def gym_steps(
-    env: gymnasium.Env[Any, Any], states: Vector, actions: npt.NDArray[np.intp]
-) -> Vector:
-    """One step of gymnasium's env from each of many states, shape (n, 4)."""
+def gym_steps(env: gymnasium.Env[Any, Any], batch: Batch) -> Vector:
+    """One step of gymnasium's env from each state of a batch, shape (n, 4)."""
     cartpole: Any = env.unwrapped
-    after = np.empty_like(states)
-    for index, (state, action) in enumerate(zip(states, actions.tolist(), strict=True)):
+    after = np.empty_like(batch.states)
+    for index, (state, action) in enumerate(zip(batch.states, batch.actions.tolist(), strict=True)):
         cartpole.state = state
         cartpole.steps_beyond_terminated = None
         cartpole.step(action)
@@ -153,18 +142,18 @@ def gym_steps(
 
 def _along(
     subject: Subject, rung: int, n: int, choose: Callable[[npt.NDArray[np.float32]], int]
-) -> tuple[Vector, npt.NDArray[np.intp]]:
+) -> Batch:
     """States and actions of episodes of our env, n steps in all."""
     env = subject.ours()
     observation, _ = env.reset(seed=subject.seed + rung)
-    states, actions = np.empty((n, 4)), np.empty(n, dtype=np.intp)
+    batch = Batch(np.empty((n, 4)), np.empty(n, dtype=np.intp))
     for index in range(n):
-        states[index] = env.unwrapped.state  # type: ignore[attr-defined]
-        actions[index] = choose(observation)
-        observation, _, terminated, truncated, _ = env.step(int(actions[index]))
+        batch.states[index] = env.unwrapped.state  # type: ignore[attr-defined]
+        action = batch.actions[index] = choose(observation)
+        observation, _, terminated, truncated, _ = env.step(action)
         if terminated or truncated:
             observation, _ = env.reset()
-    return states, actions
+    return batch
 
 
 def _random(rng: np.random.Generator) -> Callable[[npt.NDArray[np.float32]], int]:
@@ -178,41 +167,38 @@ def _adversarial(observation: npt.NDArray[np.float32]) -> int:
 
 
 def _compare(
-    subject: Subject,
-    integrator: Integrator,
-    name: str,
-    states: Vector,
-    actions: npt.NDArray[np.intp],
-    expected: Vector,
+    subject: Subject, integrator: Integrator, name: str, batch: Batch, expected: Vector
 ) -> Row:
-    controls = np.array(subject.cartpole.controls)[actions]
-    forces = np.array(subject.reference.forces)[actions]
-    found = subject.simulation(integrator).steps(states, controls)
+    found = subject.simulation(integrator).steps(batch.states, subject.controls(batch))
     p = subject.reference
-    added = p.timestep * acceleration_scale(p, states, forces)[:, [0, 0, 1, 1]]
+    terms = acceleration_scale(p, batch.states, subject.forces(batch))
+    added = p.timestep * terms[:, [0, 0, 1, 1]]
     unit = EPS * np.maximum(np.maximum(1.0, np.abs(expected)), added)
     error = np.abs(found - expected) / unit
-    figure = Figure(f"{name}, {len(states):,}", _largest(error), STEP_BOUND, "ulp")
+    figure = Figure(f"{name} ({len(error):,})", float(error.max()), STEP_BOUND, "ulp")
     if figure.holds:
         return figure, ()
-    worst = int(np.nanargmax(error.max(axis=1)))
-    story = (
-        f"worst state {_numbers(states[worst])}, action {actions[worst]}",
-        f"MuJoCo {_numbers(found[worst])}, {name.split(',')[0]} {_numbers(expected[worst])}",
-        likely_cause(subject, integrator, states, actions, found),
+    cause = likely_cause(subject, integrator, batch, found)
+    return figure, (*_worst_case(batch, error, found, expected, name), cause)
+
+
+def _worst_case(
+    batch: Batch, error: Vector, found: Vector, expected: Vector, witness: str
+) -> tuple[str, str]:
+    """Where the error is largest, and what both said."""
+    # A NaN is worse than any number.
+    worst = int(np.nan_to_num(error, nan=np.inf).max(axis=1).argmax())
+    return (
+        f"worst state {_numbers(batch.states[worst])}, action {batch.actions[worst]}",
+        f"MuJoCo {_numbers(found[worst])}, {witness} {_numbers(expected[worst])}",
     )
-    return figure, story
-
-
-def _largest(error: Vector) -> float:
-    """The largest value; NaN if there is one, which no bound lets pass."""
-    return float(error.max())
 
 
 def _numbers(values: Vector) -> str:
     return "(" + ", ".join(f"{value:.10g}" for value in values) + ")"
 
 
-def _beyond(rung: int, title: str, reason: str, beyond: list[str]) -> Result:
+def beyond_result(rung: int, title: str, reason: str, beyond: list[str]) -> Result:
+    """A rung that says nothing, since the model has what the equations do not cover."""
     why = "the equations do not cover: " + "; ".join(beyond)
     return Result(rung, title, reason, skipped=why, beyond=True)

@@ -1,5 +1,6 @@
 """What one rung of the ladder found."""
 
+import dataclasses
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -15,17 +16,21 @@ class Figure:
         value: What was measured.
         bound: The most it may be; None for a figure that is only reported.
         unit: In words.
+        at_least: Whether the bound is the least it may be, instead.
     """
 
     name: str
     value: float
     bound: float | None = None
     unit: str = ""
+    at_least: bool = False
 
     @property
     def holds(self) -> bool:
         """Whether the value is within its bound; NaN is not."""
-        return self.bound is None or self.value <= self.bound
+        if self.bound is None:
+            return True
+        return self.value >= self.bound if self.at_least else self.value <= self.bound
 
 
 @dataclass(frozen=True)
@@ -68,10 +73,7 @@ class Result:
             "title": self.title,
             "verdict": self.verdict,
             "reason": self.reason,
-            "figures": [
-                {"name": f.name, "value": f.value, "bound": f.bound, "unit": f.unit}
-                for f in self.figures
-            ],
+            "figures": [{**dataclasses.asdict(f), "holds": f.holds} for f in self.figures],
             "problems": list(self.problems),
             "story": list(self.story),
             "skipped": self.skipped,

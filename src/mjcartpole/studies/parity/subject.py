@@ -1,9 +1,8 @@
 """The model under examination, and what it is held against."""
 
-import dataclasses
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import gymnasium
 import numpy as np
@@ -14,16 +13,11 @@ from mjcartpole.envs.registration import ENV_ID
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.policy import Policy
 from mjcartpole.learning.training import Training
+from mjcartpole.physics.beyond import beyond_equations, beyond_step, overridden_masses
 from mjcartpole.physics.equations import CARTPOLE_V1, Parameters
 from mjcartpole.physics.integrator import Integrator
-from mjcartpole.physics.model import CartPole
-from mjcartpole.physics.parameters import (
-    beyond_equations,
-    beyond_step,
-    differences,
-    overridden_masses,
-    read_parameters,
-)
+from mjcartpole.physics.model import CartPole, with_options
+from mjcartpole.physics.parameters import differences, read_parameters
 from mjcartpole.physics.simulation import Simulation
 
 Against = Literal["cartpole-v1", "itself"]
@@ -32,6 +26,14 @@ KINEMATICS: dict[Integrator, str] = {"gym": "euler", "mujoco": "semi-implicit"}
 """What gymnasium calls our integrators."""
 
 Vector = npt.NDArray[np.float64]
+
+
+class Batch(NamedTuple):
+    """States, shape (n, 4), and the action taken in each, shape (n,)."""
+
+    states: Vector
+    actions: npt.NDArray[np.intp]
+
 
 # Enough to stay up for a while, not always: episodes then differ in length and ending.
 _POLICY = TrainConfig.preset("tuned", episodes=250, seed=1)
@@ -42,7 +44,8 @@ class Subject:
     """A model, the question asked of it, and the witnesses.
 
     Attributes:
-        cartpole: The model; load it with its own timestep if that does not divide 0.02 s.
+        cartpole: The model. One action is one physics step here, however long it is: parity is a
+            question of single steps.
         against: Which question: see the package.
         quick: Whether to take fewer samples.
         seed: Seeds every draw.
@@ -53,12 +56,14 @@ class Subject:
     quick: bool = False
     seed: int = 0
 
+    def __post_init__(self) -> None:
+        if self.cartpole.substeps != 1:
+            object.__setattr__(self, "cartpole", with_options(self.cartpole))
+
     @cached_property
     def own(self) -> Parameters:
-        """The model's own parameters, with the timestep of one control step."""
-        parameters = read_parameters(self.cartpole)
-        step = self.cartpole.timestep * self.cartpole.substeps
-        return dataclasses.replace(parameters, timestep=step)
+        """The model's own parameters."""
+        return read_parameters(self.cartpole)
 
     @cached_property
     def reference(self) -> Parameters:
@@ -73,9 +78,7 @@ class Subject:
     @cached_property
     def beyond_step(self) -> list[str]:
         """Why one step of the file's own integrator is not semi-implicit Euler."""
-        steps = self.cartpole.substeps
-        several = [f"{steps} physics steps per control step"] if steps > 1 else []
-        return several + beyond_step(self.cartpole)
+        return beyond_step(self.cartpole)
 
     @cached_property
     def causes(self) -> list[str]:
@@ -109,6 +112,10 @@ class Subject:
         env.unwrapped.kinematics_integrator = KINEMATICS[integrator]  # type: ignore[attr-defined]
         return env
 
+    def gyms_as_is(self) -> gymnasium.Env[Any, Any]:
+        """Gymnasium's environment with nothing changed."""
+        return gymnasium.make(GYM_ID, disable_env_checker=True)
+
     @cached_property
     def gym_cannot(self) -> str:
         """Why gymnasium's formula cannot express the reference; empty if it can."""
@@ -122,10 +129,18 @@ class Subject:
             pass
         return training.result().policy
 
-    def states(self, rung: int, n: int, box: npt.ArrayLike) -> tuple[Vector, npt.NDArray[np.intp]]:
-        """Random states within ±box, shape (n, 4), and actions, shape (n,)."""
+    def random_batch(self, rung: int, n: int, box: npt.ArrayLike) -> Batch:
+        """N random states within ±box, and actions."""
         rng, bound = self.rng(rung), np.asarray(box, dtype=np.float64)
-        return rng.uniform(-bound, bound, size=(n, 4)), rng.integers(2, size=n)
+        return Batch(rng.uniform(-bound, bound, size=(n, 4)), rng.integers(2, size=n))
+
+    def forces(self, batch: Batch) -> Vector:
+        """The reference's push for each action of a batch, N."""
+        return np.array(self.reference.forces)[batch.actions]
+
+    def controls(self, batch: Batch) -> Vector:
+        """The model's control for each action of a batch."""
+        return np.array(self.cartpole.controls)[batch.actions]
 
 
 def why_not_gymnasiums(p: Parameters) -> str:
@@ -136,7 +151,9 @@ def why_not_gymnasiums(p: Parameters) -> str:
     if p.slider_damping or p.hinge_damping or p.slider_armature or p.hinge_armature:
         return "it knows neither damping nor armature"
     if p.forces[0] != -p.forces[1] or p.hinge_sign != 1:
-        return "it pushes as hard to the left as to the right, and positive angles lean to the right"
+        return (
+            "it pushes as hard to the left as to the right, and positive angles lean to the right"
+        )
     return ""
 
 

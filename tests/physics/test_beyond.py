@@ -6,8 +6,9 @@ import mujoco
 import numpy as np
 import pytest
 
+from mjcartpole.physics.beyond import beyond_equations, beyond_step, overridden_masses
 from mjcartpole.physics.model import load_model
-from mjcartpole.physics.parameters import beyond_equations, beyond_step, read_parameters
+from mjcartpole.physics.parameters import read_parameters
 from mjcartpole.physics.simulation import Simulation
 
 REFERENCE = load_model("cartpole").xml
@@ -213,3 +214,18 @@ def test_steps_that_are_not_eulers_are_named():
     assert beyond_step(changed(flag('eulerdamp="disable"'))) == []
     damped = changed(flag('eulerdamp="disable"'), plus(HINGE, 'damping="1"'))
     assert beyond_step(damped) == ["implicit damping (eulerdamp) switched off"]
+
+
+def test_a_mass_that_an_inertial_overrides_is_named():
+    assert overridden_masses(load_model()) == []
+    heavy = changed(('<geom name="pole"', '<geom name="pole" mass="0.01"'))
+    assert read_parameters(heavy) == read_parameters(load_model())
+    assert overridden_masses(heavy) == [
+        "mass 0.01 of geom 'pole', which the <inertial> of body 'pole' overrides"
+    ]
+    used = changed(
+        ('<geom name="pole"', '<geom name="pole" mass="0.01"'),
+        ('angle="radian"', 'angle="radian" inertiafromgeom="true"'),
+        ('<geom name="cart"', '<geom name="cart" mass="1"'),
+    )
+    assert overridden_masses(used) == []

@@ -1,0 +1,100 @@
+"""What `mjcartpole parity` does and prints."""
+
+import dataclasses
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+
+from mjcartpole.files import check_writable, make_folder, write_whole
+from mjcartpole.learning.runs import versions
+from mjcartpole.physics.model import load_model
+from mjcartpole.physics.simulation import silence_mujoco
+from mjcartpole.studies.parity import Against, Figure, Result, Subject, run_ladder
+from mjcartpole.studies.parity.ladder import check_rungs
+
+QUESTIONS: dict[Against, str] = {
+    "cartpole-v1": "Is {} CartPole-v1?",
+    "itself": "Does MuJoCo move {} as the equations with its own parameters do?",
+}
+VERDICTS = {"holds": "holds", "fails": "FAILS", "beyond": "BEYOND", "skipped": "skipped"}
+
+
+def run_parity(
+    model: str, *, against: Against, rungs: Sequence[int], quick: bool, output: Path | None
+) -> int:
+    """Climb the ladder and print each rung as it is found. Returns the exit code."""
+    silence_mujoco()
+    check_rungs(rungs)
+    cartpole = load_model(model, own_timestep=True)
+    subject = Subject(cartpole, against, quick)
+    # A model whose parameters cannot be read is the user's mistake: better known before any work.
+    _ = subject.causes
+    if output:
+        check_writable(make_folder(output.parent))
+    print(QUESTIONS[against].format(cartpole.name) + (" (quick)" if quick else ""))
+    results: list[Result] = []
+    with Console(stderr=True).status("climbing …"):
+        for result in run_ladder(subject, rungs):
+            results.append(result)
+            _print_result(result)
+    holds = all(result.verdict in {"holds", "skipped"} for result in results)
+    _print_answer(subject, results, holds)
+    if output:
+        write_whole(output, json.dumps(_report(subject, results, holds), indent=2) + "\n")
+        print(f"\nreport {output}")
+    return 0 if holds else 1
+
+
+def _print_result(result: Result) -> None:
+    print(f"\n{result.rung:2d}  {VERDICTS[result.verdict]:8s} {result.title}")
+    if result.skipped:
+        print(f"     {result.skipped}")
+    for figure in result.figures:
+        print(f"     {figure.name:52s} {_number(figure.value):>10s} {_bound(figure)}")
+    for line in (*result.problems, *result.story):
+        print(f"     ! {line}")
+    if not result.skipped:
+        print(f"     because: {result.reason}")
+
+
+def _number(value: float) -> str:
+    return f"{value:.0f}" if value == round(value) and abs(value) < 1e7 else f"{value:.4g}"
+
+
+def _bound(figure: Figure) -> str:
+    """The bound in words; a figure without one is only reported."""
+    if figure.bound is None:
+        return figure.unit
+    relation = "≥" if figure.at_least else "≤"
+    mark = "" if figure.holds else "   <- out of bounds"
+    return f"{relation} {_number(figure.bound)} {figure.unit}".rstrip() + mark
+
+
+def _print_answer(subject: Subject, results: list[Result], holds: bool) -> None:
+    name = subject.cartpole.name
+    failed = [str(r.rung) for r in results if r.verdict in {"fails", "beyond"}]
+    skipped = [str(r.rung) for r in results if r.verdict == "skipped"]
+    ending = f"; skipped: {', '.join(skipped)}" if skipped else ""
+    if holds:
+        print(f"\n{name}: all rungs hold ({len(results) - len(skipped)}){ending}")
+        return
+    print(f"\n{name}: does not hold on rung {', '.join(failed)}{ending}")
+    for cause in subject.causes:
+        print(f"  {cause}")
+
+
+def _report(subject: Subject, results: list[Result], holds: bool) -> dict[str, Any]:
+    return {
+        "model": subject.cartpole.name,
+        "against": subject.against,
+        "quick": subject.quick,
+        "holds": holds,
+        "causes": subject.causes,
+        "parameters": dataclasses.asdict(subject.own),
+        "reference": dataclasses.asdict(subject.reference),
+        "versions": versions(),
+        "rungs": [result.as_dict() for result in results],
+    }

@@ -1,0 +1,104 @@
+"""Rung 9: what each integrator does as the step shrinks, and to the energy."""
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+from mjcartpole.physics import equations
+from mjcartpole.physics.integrator import Integrator
+from mjcartpole.physics.model import with_options
+from mjcartpole.physics.simulation import Simulation
+from mjcartpole.studies.parity.dynamics import beyond_result
+from mjcartpole.studies.parity.result import Figure, Result
+from mjcartpole.studies.parity.subject import Subject, Vector
+
+METHODS: dict[str, tuple[Integrator, str, int]] = {
+    "explicit Euler": ("gym", "Euler", 1),
+    "semi-implicit Euler": ("mujoco", "Euler", 1),
+    "RK4": ("mujoco", "RK4", 4),
+}
+"""Our integrator, the file's, and the order that theory gives it."""
+
+START = np.array([0.0, 0.3, 0.4, -0.5])
+HALVINGS = 5
+ORDER_TOLERANCE = 0.15
+ENERGY_SECONDS = 10.0
+
+
+def convergence(subject: Subject) -> Result:
+    """Rung 9: measured order against SciPy's DOP853 on the equations; energy gained or lost."""
+    title = "convergence: each integrator against DOP853, and its energy"
+    reason = "theory: halving the step halves Euler's error (order 1) and makes RK4's 16 times less"
+    if subject.against == "itself" and subject.beyond:
+        return beyond_result(9, title, reason, subject.beyond)
+    exact = _exact(subject, _period(subject))
+    figures: list[Figure] = []
+    for name, (integrator, option, order) in METHODS.items():
+        measured = _order(subject, integrator, option, exact)
+        figures.append(
+            Figure(f"{name}: |order - {order}|", abs(measured - order), ORDER_TOLERANCE, "")
+        )
+        figures.append(Figure(f"{name}: order", measured))
+    for name, (integrator, option, _) in METHODS.items():
+        gain = energy_gain(subject, integrator, option)
+        figures.append(
+            Figure(f"{name}: energy gained in {ENERGY_SECONDS:g} s", gain, None, "m g l")
+        )
+    bad = any(not figure.holds for figure in figures)
+    return Result(9, title, reason, tuple(figures), (), tuple(subject.causes) if bad else ())
+
+
+def _period(subject: Subject) -> float:
+    """A time in which the pole moves well, but not far: its own time scale, s."""
+    p = subject.reference
+    arm = p.inertia / (p.pole_mass * abs(p.com_distance)) + abs(p.com_distance)
+    return 1.5 * float(np.sqrt(arm / max(abs(p.gravity), 1e-3)))
+
+
+def _exact(subject: Subject, duration: float) -> Vector:
+    p, force = subject.reference, subject.reference.forces[1]
+    solution = solve_ivp(
+        lambda _, state: equations.derivative(p, state, force),
+        (0.0, duration),
+        START,
+        method="DOP853",
+        rtol=1e-13,
+        atol=1e-13,
+    )
+    return np.array(solution.y[:, -1])
+
+
+def _order(subject: Subject, integrator: Integrator, option: str, exact: Vector) -> float:
+    """Slope of log error over log step, by least squares over the finest steps."""
+    duration = _period(subject)
+    # RK4 is exact to rounding soon, so it starts coarser.
+    coarsest = 8 if option == "RK4" else 128
+    counts = [coarsest * 2**i for i in range(HALVINGS)]
+    errors = []
+    for count in counts:
+        cartpole = with_options(subject.cartpole, timestep=duration / count, integrator=option)
+        simulation = Simulation(cartpole, integrator)
+        simulation.state = START
+        for _ in range(count):
+            simulation.step(subject.cartpole.controls[1])
+        errors.append(float(np.abs(simulation.state - exact).max()))
+    slope, _ = np.polyfit(-np.log(counts[1:]), np.log(np.maximum(errors[1:], 1e-300)), 1)
+    return float(slope)
+
+
+def energy_gain(subject: Subject, integrator: Integrator, option: str) -> float:
+    """Energy gained by a free swing at the model's own timestep, over m g l."""
+    energies = energy_track(subject, integrator, option)
+    p = subject.reference
+    return float((energies[-1] - energies[0]) / (p.pole_mass * abs(p.gravity * p.com_distance)))
+
+
+def energy_track(subject: Subject, integrator: Integrator, option: str) -> Vector:
+    """Energy after each step of a free swing that starts hanging aside, J."""
+    cartpole = with_options(subject.cartpole, timestep=subject.cartpole.timestep, integrator=option)
+    simulation = Simulation(cartpole, integrator)
+    simulation.state = [0.0, 0.0, np.pi - 0.5, 0.0]
+    states = [simulation.state]
+    for _ in range(round(ENERGY_SECONDS / cartpole.timestep)):
+        simulation.step(0.0)
+        states.append(simulation.state)
+    return equations.energy(subject.own, np.array(states))

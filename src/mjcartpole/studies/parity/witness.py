@@ -1,0 +1,43 @@
+"""Rung 10: dm_control steps the same document to the same bits."""
+
+import warnings
+from typing import Any
+
+import numpy as np
+
+from mjcartpole.studies.parity.result import Figure, Result
+from mjcartpole.studies.parity.subject import Subject
+
+TITLE = "third witness: dm_control steps the same document"
+REASON = "the same engine on the same document: not one bit may differ"
+
+
+def dm_control(subject: Subject) -> Result:
+    """Rung 10: `dm_control.mujoco.Physics` against our simulation with the file's integrator."""
+    try:
+        with warnings.catch_warnings():
+            # It looks for a window system on import, and warns where there is none.
+            warnings.simplefilter("ignore")
+            from dm_control import mujoco  # noqa: PLC0415 - slow to import, and may not load
+    except Exception as error:
+        why = f"dm_control does not load: {type(error).__name__}: {error}"
+        return Result(10, TITLE, REASON, skipped=" ".join(why.split()))
+    physics: Any = mujoco.Physics.from_xml_string(subject.cartpole.xml)
+    physics.legacy_step = False
+    simulation = subject.simulation("mujoco")
+    order = [subject.cartpole.slider, subject.cartpole.hinge]
+    rng = subject.rng(10)
+    episodes, steps, different = 20, 100, 0
+    for _ in range(episodes):
+        simulation.state = state = rng.uniform(-0.2, 0.2, size=4)
+        physics.reset()
+        physics.data.qpos[order], physics.data.qvel[order] = state[[0, 2]], state[[1, 3]]
+        for action in rng.integers(2, size=steps):
+            control = subject.cartpole.controls[action]
+            physics.set_control([control])
+            physics.step(subject.cartpole.substeps)
+            simulation.step(control)
+            theirs = np.concatenate([physics.data.qpos[order], physics.data.qvel[order]])
+            different += simulation.state[[0, 2, 1, 3]].tobytes() != theirs.tobytes()
+    figures = (Figure(f"steps that differ ({episodes * steps:,})", float(different), 0.0),)
+    return Result(10, TITLE, REASON, figures)
