@@ -14,6 +14,9 @@ from mjcartpole.studies.parity.subject import Batch, Subject, Vector
 _NUDGE = 1e-6
 """Relative change by which a parameter's effect is measured."""
 
+_ENOUGH = 0.9
+"""A share of the squared error that one parameter must explain to be blamed alone."""
+
 
 def likely_cause(
     subject: Subject,
@@ -42,15 +45,19 @@ def likely_cause(
     error = found - base
     if not np.isfinite(error).all():
         return "likely cause: none can be named, since the steps are not finite"
+    own = differences(subject.own, reference)
+    if not own and subject.causes:
+        return f"likely cause: {'; '.join(subject.causes)}"
     candidates = list(_own_differences(subject.own, reference)) or list(
         _fitted(reference, steps, base, error)
     )
-    if not candidates:
-        return "likely cause: " + ("; ".join(subject.causes) or "not in the model's parameters")
     total = float(np.sum(error**2))
     shares = [1 - float(np.sum((found - steps(p)) ** 2)) / total for _, p in candidates]
     best = int(np.argmax(shares))
-    return f"likely cause: {candidates[best][0]} (explains {max(shares[best], 0):.1%} of it)"
+    name, share = candidates[best][0], max(shares[best], 0.0)
+    if share < _ENOUGH and len(own) > 1:
+        return f"likely cause: more than one parameter: {'; '.join(own)}"
+    return f"likely cause: {name} (alone it explains {share:.1%} of the error)"
 
 
 def _own_differences(own: Parameters, reference: Parameters) -> Iterator[tuple[str, Parameters]]:

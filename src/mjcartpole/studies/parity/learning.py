@@ -12,6 +12,7 @@ from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.loop import play_episode
 from mjcartpole.learning.training import Training
 from mjcartpole.studies.evaluation import SEED
+from mjcartpole.studies.parity.dynamics import beyond_result
 from mjcartpole.studies.parity.result import Figure, Result
 from mjcartpole.studies.parity.subject import Subject, Vector
 
@@ -43,6 +44,8 @@ def learning(subject: Subject) -> Result:
         f"difference over {SEEDS} seeds must lie within ±{CURVE_MARGIN:g} (curve) and "
         f"±{GREEDY_MARGIN:g} (greedy)"
     )
+    if subject.against == "itself" and subject.beyond:
+        return beyond_result(8, title, reason, subject.beyond)
     if subject.gym_cannot:
         return Result(
             8, title, reason, skipped=f"gymnasium cannot play this cart-pole: {subject.gym_cannot}"

@@ -88,6 +88,15 @@ class Subject:
             found += self.beyond_step + overridden_masses(self.cartpole)
         return found
 
+    @cached_property
+    def causes_at_rest(self) -> list[str]:
+        """Those causes that accelerations can show: neither the timestep nor the integrator."""
+        return [
+            cause
+            for cause in self.causes
+            if cause not in self.beyond_step and not cause.startswith("timestep ")
+        ]
+
     def rng(self, rung: int) -> np.random.Generator:
         """A rung's own generator, so that rungs can be run alone with the same result."""
         return np.random.default_rng([self.seed, rung])

@@ -1,6 +1,6 @@
 """Rungs 6 and 7: how long two worlds stay together, open loop and closed loop."""
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import gymnasium
 import numpy as np
@@ -9,14 +9,11 @@ from scipy import stats
 
 from mjcartpole.learning.loop import ENDINGS, ending_of
 from mjcartpole.physics import equations
-from mjcartpole.studies.parity.dynamics import EPS, beyond_result
+from mjcartpole.studies.parity.dynamics import EPS, STEP_BOUNDS, beyond_result, step_unit
 from mjcartpole.studies.parity.result import Figure, Result
-from mjcartpole.studies.parity.subject import Subject, Vector
+from mjcartpole.studies.parity.subject import Batch, Subject, Vector
 
 HORIZON = 400
-ENVELOPE_FACTOR = 32.0
-"""An envelope may be exceeded this many times: every step adds its own rounding, and the sum of a
-geometric series multiplies it by up to rho / (rho - 1), about 14 for CartPole-v1."""
 
 LARGEST_ERROR = 1e-3
 """Beyond this the linearised growth means nothing."""
@@ -31,47 +28,77 @@ def horizon(subject: Subject) -> Result:
     """Rung 6: the same pushes in both worlds; the error against eps rho^t."""
     title = "horizon: open-loop error against its predicted growth"
     reason = (
-        f"an upright pole multiplies an error by rho each step: {ENVELOPE_FACTOR:.0f} eps rho^t, "
+        f"each step may round by rung 3's {STEP_BOUNDS[subject.against]:.0f} ulp, and the "
+        "linearised step multiplies that by rho: eps rho^t times a constant that follows, "
         f"up to {LARGEST_ERROR:g}"
     )
     if subject.against == "itself" and subject.beyond:
         return beyond_result(6, title, reason, subject.beyond)
-    rho = equations.spectral_radius(subject.reference, "gym")
-    runs = [_error_growth(subject, seed) for seed in range(4 if subject.quick else 20)]
-    ratios, parted = [], []
-    for error, float32_step in runs:
-        envelope = EPS * rho ** np.arange(1, len(error) + 1)
-        meant = envelope * ENVELOPE_FACTOR < LARGEST_ERROR
-        ratios.append(float((error / envelope)[meant].max(initial=0.0)))
-        parted.append(float32_step)
+    runs = [error_growth(subject, seed) for seed in range(4 if subject.quick else 20)]
+    ratios = []
+    for run in runs:
+        meant = run.predicted < LARGEST_ERROR
+        ratios.append(float((run.error / run.predicted)[meant].max(initial=0.0)))
     figures = (
-        Figure("largest error", max(ratios), ENVELOPE_FACTOR, "eps rho^t"),
-        Figure("rho, growth per step", rho),
-        Figure("float32 observations first differ at step, median", float(np.median(parted))),
+        Figure("largest error", max(ratios), 1.0, "of the predicted bound"),
+        Figure("rho, growth per step", equations.spectral_radius(subject.reference, "gym")),
+        Figure(
+            "float32 observations first differ at step, median",
+            float(np.median([run.parted for run in runs])),
+        ),
         Figure("episodes", float(len(runs))),
     )
     story = () if figures[0].holds else tuple(subject.causes)
     return Result(6, title, reason, figures, (), story)
 
 
-def _error_growth(subject: Subject, seed: int) -> tuple[Vector, int]:
-    """Largest difference of the two states after each step, and when float32 first shows it."""
-    rng = subject.rng(600 + seed)
-    state = rng.uniform(-0.05, 0.05, size=4)
+class Growth(NamedTuple):
+    """How an error grew in one open-loop episode.
+
+    Attributes:
+        error: Largest difference of the two states after each step, shape (t,).
+        predicted: Bound for it, shape (t,).
+        parted: Step at which float32 observations first differ.
+    """
+
+    error: Vector
+    predicted: Vector
+    parted: int
+
+
+def error_growth(subject: Subject, seed: int) -> Growth:
+    """Play the same actions in both worlds until the pole leans far, and watch the difference."""
+    state = subject.rng(600 + seed).uniform(-0.05, 0.05, size=4)
     simulation, other = subject.simulation("gym"), _Reference(subject, state)
     simulation.state = state
     gain = _stabilising_gain(subject)
-    errors, parted = [], HORIZON
-    for step in range(HORIZON):
+    errors: list[float] = []
+    unit, parted = EPS, HORIZON
+    while len(errors) < HORIZON and abs(state[2]) < 0.5 and not (errors and errors[-1] > 1):
         action = int(gain @ state > 0)
+        batch = Batch(state[None, :], np.array([action]))
         state = np.array(simulation.step(subject.cartpole.controls[action]))
         expected = other.step(action)
+        unit = max(unit, float(step_unit(subject, batch, expected[None, :]).max()))
         errors.append(float(np.abs(state - expected).max()))
         if parted == HORIZON and np.any(state.astype(np.float32) != expected.astype(np.float32)):
-            parted = step + 1
-        if abs(state[2]) > 0.5 or errors[-1] > 1:
-            break
-    return np.array(errors), parted
+            parted = len(errors)
+    return Growth(np.array(errors), predicted_growth(subject, len(errors), unit), parted)
+
+
+def predicted_growth(subject: Subject, steps: int, unit: float = EPS) -> Vector:
+    """Bound for the error after each step: what every step may round, carried on, shape (steps,).
+
+    sum over k < t of |J^k| u, with J the linearised step and u the bound of one step; it grows as
+    rho^t, with rho the spectral radius of J.
+    """
+    matrix = equations.step_matrix(subject.reference, "gym")
+    power, total, bounds = np.eye(4), 0.0, np.empty(steps)
+    for step in range(steps):
+        total += float(np.linalg.norm(power, np.inf))
+        bounds[step] = STEP_BOUNDS[subject.against] * unit * total
+        power = power @ matrix
+    return bounds
 
 
 class _Reference:
@@ -112,11 +139,12 @@ def closed_loop(subject: Subject) -> Result:
         f"actions must be equal while the predicted error is below {UNDECIDED:g}; afterwards "
         f"lengths and endings are compared as distributions (p ≥ {SIGNIFICANCE:g})"
     )
+    if subject.against == "itself" and subject.beyond:
+        return beyond_result(7, title, reason, subject.beyond)
     if subject.gym_cannot:
         why = f"gymnasium cannot play this cart-pole: {subject.gym_cannot}"
         return Result(7, title, reason, skipped=why)
-    rho = equations.spectral_radius(subject.reference, "gym")
-    safe = int(np.log(UNDECIDED / (ENVELOPE_FACTOR * EPS)) / np.log(rho)) if rho > 1 else HORIZON
+    safe = int(np.sum(predicted_growth(subject, HORIZON) < UNDECIDED))
     episodes = 40 if subject.quick else 300
     ours, gyms = (
         [_play(env, subject, seed) for seed in range(episodes)]
