@@ -9,6 +9,7 @@ from mjcartpole.studies.parity.result import Figure, Result
 from mjcartpole.studies.parity.subject import Subject
 
 TITLE = "third witness: dm_control steps the same document"
+EPISODES, STEPS, FAR = 40, 50, 1e3
 REASON = "the same engine on the same document: not one bit may differ"
 
 
@@ -27,17 +28,20 @@ def dm_control(subject: Subject) -> Result:
     simulation = subject.simulation("mujoco")
     order = [subject.cartpole.slider, subject.cartpole.hinge]
     rng = subject.rng(10)
-    episodes, steps, different = 20, 100, 0
-    for _ in range(episodes):
+    compared = different = 0
+    for _ in range(EPISODES):
         simulation.state = state = rng.uniform(-0.2, 0.2, size=4)
         physics.reset()
         physics.data.qpos[order], physics.data.qvel[order] = state[[0, 2]], state[[1, 3]]
-        for action in rng.integers(2, size=steps):
+        for action in rng.integers(2, size=STEPS):
             control = subject.cartpole.controls[action]
             physics.set_control([control])
             physics.step(subject.cartpole.substeps)
             simulation.step(control)
             theirs = np.concatenate([physics.data.qpos[order], physics.data.qvel[order]])
+            compared += 1
             different += simulation.state[[0, 2, 1, 3]].tobytes() != theirs.tobytes()
-    figures = (Figure(f"steps that differ ({episodes * steps:,})", float(different), 0.0),)
+            if np.abs(theirs).max() > FAR:
+                break  # dm_control refuses to go on where MuJoCo gives up
+    figures = (Figure(f"steps that differ ({compared:,})", float(different), 0.0),)
     return Result(10, TITLE, REASON, figures)
