@@ -23,21 +23,33 @@ from mjcartpole.learning.training import train
 from mjcartpole.studies.evaluation import evaluate
 
 # What was tried around `tuned`: each entry changes its defaults.
+ONE_STEP = {
+    "td_lambda": None,
+    "episodes": 2_000,
+    "alpha": 0.3,
+    "low": (-2.4, -1.0, -0.2095, -1.5),
+    "high": (2.4, 1.0, 0.2095, 1.5),
+}
 VARIANTS: dict[str, dict[str, Any]] = {
     "tuned": {},
-    "1,000 episodes": {"episodes": 1_000},
-    "500 episodes": {"episodes": 500},
+    "750 episodes": {"episodes": 750},
+    "3,000 episodes": {"episodes": 3_000},
+    "lambda 0.7": {"td_lambda": 0.7},
+    "lambda 0.97": {"td_lambda": 0.97},
     "random ties": {"ties": "random"},
-    "table from 0": {"q_init_low": 0.0, "q_init_high": 0.0},
-    "table from 50 (never disappointed)": {"q_init_low": 50.0, "q_init_high": 50.0},
-    "constant alpha 0.1": {"alpha": 0.1, "alpha_final": 0.1},
+    "constant alpha 0.1": {"alpha_final": 0.1},
+    "alpha from 0.3": {"alpha": 0.3},
     "epsilon 0.1 from the start": {"epsilon": 0.1},
+    "epsilon down to 0.05": {"epsilon_final": 0.05},
     "gamma 0.95": {"gamma": 0.95},
-    "gamma 0.99": {"gamma": 0.99},
+    "bins 1,3,4,8": {"bins": (1, 3, 4, 8)},
     "bins 1,1,6,12": {"bins": (1, 1, 6, 12)},
     "bins 3,3,6,8": {"bins": (3, 3, 6, 8)},
-    "bins 1,3,4,8": {"bins": (1, 3, 4, 8)},
     "last step not learned": {"learn_last_step": False},
+    "one step, 2,000 episodes": ONE_STEP,
+    "one step, constant alpha 0.1": {**ONE_STEP, "alpha": 0.1, "alpha_final": 0.1},
+    "one step, bins 1,1,6,12": {**ONE_STEP, "bins": (1, 1, 6, 12)},
+    "one step, bins 3,3,6,8": {**ONE_STEP, "bins": (3, 3, 6, 8)},
 }
 
 Job = tuple[str, TrainConfig]

@@ -26,6 +26,7 @@ def test_the_article_as_printed():
     assert (config.q_init_low, config.q_init_high) == (0.0, 1.0)
     assert (config.episodes, config.log_every) == (12_000, 2_000)
     assert config.learn_last_step is False
+    assert config.td_lambda is None
     terminal = TrainConfig.preset("article-terminal")
     assert dataclasses.replace(terminal, learn_last_step=False) == config
 
@@ -66,6 +67,7 @@ def test_presets_name_fields_only(name):
         ({"alpha": -0.1}, "alpha"),
         ({"epsilon": "much"}, "epsilon"),
         ({"decay": 2}, "decay"),
+        ({"td_lambda": 1.1}, "td_lambda must be a number from 0 to 1"),
         ({"q_init_low": 2.0, "q_init_high": 1.0}, "in order"),
         ({"q_init_high": math.inf}, "finite"),
         ({"ties": "last"}, "ties must be"),

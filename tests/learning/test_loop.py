@@ -91,8 +91,9 @@ def test_the_article_presets_do_what_the_articles_code_does(preset):
 class Recorder:
     """Stands in for a learner, pushes to the right, and keeps what it is taught."""
 
-    def __init__(self, learn_last_step):
+    def __init__(self, learn_last_step, td_lambda=None):
         self.learn_last_step = learn_last_step
+        self.td_lambda = td_lambda
         self.taught = []
 
     def begin_episode(self, episode):
@@ -103,6 +104,9 @@ class Recorder:
 
     def update(self, s, a, r, s_next, terminated):
         self.taught[-1].append((s, a, r, s_next, terminated))
+
+    def replay(self, states, actions, rewards, over):
+        self.taught[-1].append((states, actions, rewards, over))
 
 
 class ThreeSteps(gymnasium.Env):
@@ -145,3 +149,15 @@ def test_what_the_last_step_teaches(terminates, learn_last_step):
         (0, 3.0, 3),
         (1, 3.0, 3),
     ]
+
+
+@pytest.mark.parametrize("terminates", [True, False])
+def test_what_is_replayed_after_an_episode(terminates):
+    grid = Discretizer((4,), (0.0,), (4.0,))
+    whole, cut = Recorder(True, td_lambda=0.9), Recorder(False, td_lambda=0.9)
+    for learner in (whole, cut):
+        episodes = list(learn_episodes(ThreeSteps(terminates), learner, grid, episodes=1, seed=0))
+        assert (episodes[0].total, episodes[0].steps) == (3.0, 3)
+    assert whole.taught == [[([0, 1, 2, 3], [1, 1, 1], [1.0] * 3, terminates)]]
+    # Without its last step an episode has an open end.
+    assert cut.taught == [[([0, 1, 2], [1, 1], [1.0] * 2, False)]]

@@ -7,7 +7,7 @@ from mjcartpole.learning.qlearning import TabularQ
 from mjcartpole.learning.schedules import LinearSchedule
 
 
-def learner(table, *, alpha=0.5, epsilon=0.0, gamma=0.9, ties="first", seed=0):
+def learner(table, *, alpha=0.5, epsilon=0.0, gamma=0.9, ties="first", seed=0, lam=None):
     return TabularQ(
         np.array(table, dtype=np.float64),
         gamma=gamma,
@@ -15,6 +15,7 @@ def learner(table, *, alpha=0.5, epsilon=0.0, gamma=0.9, ties="first", seed=0):
         epsilon=LinearSchedule(epsilon, 0.0, 10),
         ties=ties,
         learn_last_step=True,
+        td_lambda=lam,
         rng=np.random.default_rng(seed),
     )
 
@@ -59,3 +60,31 @@ def test_schedules_follow_the_episode():
     assert (q.alpha, q.epsilon) == (0.25, 0.5)
     q.begin_episode(50)
     assert (q.alpha, q.epsilon) == (0.0, 0.0)
+
+
+def test_an_episode_is_learned_backwards_from_lambda_returns():
+    q = learner([[0.0, 0.0], [0.0, 10.0], [4.0, 2.0]], lam=0.5)
+    q.replay([0, 1, 2], [0, 1], [1.0, 1.0], over=False)
+    # The last step: G = 1 + 0.9 · 4 = 4.6 moves 10 half way, to 7.3. The first:
+    # G = 1 + 0.9 (0.5 · 7.3 + 0.5 · 4.6) = 6.355, half way from 0.
+    assert q.q_table.tolist() == [
+        [pytest.approx(3.1775), 0.0],
+        [0.0, pytest.approx(7.3)],
+        [4.0, 2.0],
+    ]
+
+
+def test_nothing_comes_after_a_terminated_episode():
+    q = learner([[0.0, 0.0], [0.0, 0.0], [4.0, 2.0]], alpha=1.0, lam=1.0)
+    q.replay([0, 1, 2], [0, 1], [1.0, 1.0], over=True)
+    assert q.q_table.tolist() == [[1.9, 0.0], [0.0, 1.0], [4.0, 2.0]]
+
+
+def test_lambda_0_is_one_step_learning_in_reverse_order():
+    table = np.random.default_rng(3).normal(size=(4, 2)).tolist()
+    replayed, stepped = learner(table, lam=0.0), learner(table)
+    states, actions, rewards = [0, 2, 1, 3], [1, 0, 1], [1.0, 0.5, 1.0]
+    replayed.replay(states, actions, rewards, over=True)
+    for t in (2, 1, 0):
+        stepped.update(states[t], actions[t], rewards[t], states[t + 1], terminated=t == 2)
+    np.testing.assert_allclose(replayed.q_table, stepped.q_table, rtol=1e-14)

@@ -161,7 +161,7 @@ def rod(rng):
         float(np.exp(rng.uniform(*np.log(ends)))) for ends in ((0.1, 10), (0.01, 5), (0.1, 5))
     )
     inertia = pole * length**2 / 12
-    text = changed(
+    return changed(
         ('mass="1.0"', f'mass="{cart!r}"'),
         (POLE, f'<inertial pos="0 0 {length / 2!r}" mass="{pole!r}"'),
         (r'diaginertia="0.00833\S* 0.00833\S*', f'diaginertia="{inertia!r} {inertia!r}'),
@@ -169,7 +169,6 @@ def rod(rng):
         ('gear="10"', f'gear="{rng.uniform(1, 50)!r}"'),
         ('timestep="0.02"', f'timestep="{rng.uniform(0.001, 0.04)!r}"'),
     )
-    return text
 
 
 @pytest.mark.parametrize("seed", range(6))

@@ -31,6 +31,7 @@ _ARTICLE: dict[str, Any] = {
     "q_init_low": 0.0,
     "q_init_high": 1.0,
     "ties": "first",
+    "td_lambda": None,
     "learn_last_step": False,
     "log_every": 2_000,
 }
@@ -52,19 +53,19 @@ class TrainConfig:
     """A shipped model's name or an MJCF file; backend mujoco only."""
     integrator: Integrator = "gym"
     """gym: explicit Euler, as CartPole-v1; mujoco: the integrator that the model's file names."""
-    episodes: int = 2_000
+    episodes: int = 1_500
     """Episodes to train."""
     seed: int = 0
     """Seeds the environment and the learner."""
     bins: tuple[int, ...] = (1, 3, 6, 8)
     """Bins for x, x_dot, theta and theta_dot; 1 ignores a dimension."""
-    low: tuple[float, ...] = (-2.4, -1.0, -0.2095, -1.5)
+    low: tuple[float, ...] = (-2.4, -0.75, -0.2095, -1.5)
     """Lower ends of the bins' ranges; what lies outside belongs to the edge bins."""
-    high: tuple[float, ...] = (2.4, 1.0, 0.2095, 1.5)
+    high: tuple[float, ...] = (2.4, 0.75, 0.2095, 1.5)
     """Upper ends of the bins' ranges."""
     gamma: float = 0.98
     """Discount per step."""
-    alpha: float = 0.3
+    alpha: float = 0.1
     """Step size at the start."""
     alpha_final: float = 0.01
     """Step size once decayed."""
@@ -78,11 +79,13 @@ class TrainConfig:
     """The table starts uniformly random between this …"""
     q_init_high: float = 10.0
     """… and this."""
+    td_lambda: float | None = 0.9
+    """Learn after each episode from lambda-returns with this lambda; None: after each step."""
     ties: Ties = "first"
     """Between equal values: the first action, or a random one."""
     learn_last_step: bool = True
     """Learn from the step that ends an episode (the article's code does not)."""
-    log_every: int = 200
+    log_every: int = 150
     """Episodes per row of the printed table."""
 
     def __post_init__(self) -> None:
@@ -132,7 +135,8 @@ class TrainConfig:
                 raise ConfigError(f"{name} must be a whole number from {least} up, not {value!r}")
 
     def _check_numbers(self) -> None:
-        for name in ("gamma", "alpha", "alpha_final", "epsilon", "epsilon_final", "decay"):
+        names = ["gamma", "alpha", "alpha_final", "epsilon", "epsilon_final", "decay"]
+        for name in [*names, "td_lambda"] if self.td_lambda is not None else names:
             value = getattr(self, name)
             if not (is_finite(value) and 0 <= value <= 1):
                 raise ConfigError(f"{name} must be a number from 0 to 1, not {value!r}")

@@ -54,16 +54,20 @@ def learn_episodes(
     for number in range(episodes):
         observation, _ = env.reset(seed=seed if number == 0 else None)
         learner.begin_episode(number)
-        yield _learn_one(env, learner, discretizer, observation, number)
+        if learner.td_lambda is None:
+            yield _learn_stepwise(env, learner, discretizer, observation, number)
+        else:
+            yield _learn_afterwards(env, learner, discretizer, observation, number)
 
 
-def _learn_one(
+def _learn_stepwise(
     env: gymnasium.Env[Any, Any],
     learner: TabularQ,
     discretizer: Discretizer,
     observation: npt.NDArray[np.float32],
     number: int,
 ) -> Episode:
+    """Learn after each step."""
     act, update, step = learner.act, learner.update, env.step
     learn_last_step = learner.learn_last_step
     total, steps, over, terminated = 0.0, 0, False, False
@@ -79,6 +83,32 @@ def _learn_one(
         steps += 1
         s = s_next
     return Episode(number, total, steps, ending_of(terminated, _state_of(env)))
+
+
+def _learn_afterwards(
+    env: gymnasium.Env[Any, Any],
+    learner: TabularQ,
+    discretizer: Discretizer,
+    observation: npt.NDArray[np.float32],
+    number: int,
+) -> Episode:
+    """Play an episode, then learn from all of it."""
+    act, step = learner.act, env.step
+    states, actions, rewards = [discretizer(observation.tolist())], [], []
+    over = terminated = False
+    while not over:
+        a = act(states[-1])
+        observation, r, terminated, truncated, _ = step(a)
+        over = terminated or truncated
+        actions.append(a)
+        rewards.append(float(r))
+        states.append(discretizer(observation.tolist()))
+    if learner.learn_last_step:
+        learner.replay(states, actions, rewards, terminated)
+    else:
+        learner.replay(states[:-1], actions[:-1], rewards[:-1], over=False)
+    ending = ending_of(terminated, _state_of(env))
+    return Episode(number, sum(rewards), len(actions), ending)
 
 
 def play_episode(

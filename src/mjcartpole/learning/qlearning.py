@@ -1,12 +1,19 @@
-"""One-step Q-learning on a table (Watkins, 1989; Sutton and Barto, 2018, section 6.5).
+"""Q-learning on a table: after each step, or after each episode from lambda-returns.
 
-    Q(s, a)  <-  Q(s, a) + alpha (r + gamma max_a' Q(s', a') - Q(s, a))
+One-step Q-learning (Watkins, 1989; Sutton and Barto, 2018, section 6.5):
+
+    Q(s, a)  <-  Q(s, a) + alpha (G - Q(s, a)),    G = r + gamma max_a' Q(s', a')
+
+With a lambda, an episode is learned when it is over, backwards, so that its end reaches its
+beginning at once (Peng and Williams, 1996, doi:10.1007/BF00114731, in its forward view):
+
+    G_t = r_t + gamma ((1 - lambda) max_a' Q(s_t+1, a') + lambda G_t+1)
 
 A terminated episode has no future, so its last target is `r` alone. A truncated one would have
 gone on, so it bootstraps like any other step.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Literal
 
 import numpy as np
@@ -37,6 +44,7 @@ class TabularQ:
         epsilon: LinearSchedule,
         ties: Ties,
         learn_last_step: bool,
+        td_lambda: float | None,
         rng: np.random.Generator,
     ) -> None:
         """Take over a table; it is changed in place.
@@ -49,6 +57,7 @@ class TabularQ:
             ties: How to choose between equal values.
             learn_last_step: Whether the step that ends an episode is learned from at all. The
                 article's code skips it, and with it the only sign of failure there is.
+            td_lambda: Lambda of the returns; None learns after each step.
             rng: Draws explorations and ties; one number per step, one more per random action.
         """
         self.q_table = q_table
@@ -56,6 +65,7 @@ class TabularQ:
         self.alpha = alpha(0)
         self.epsilon = epsilon(0)
         self.learn_last_step = learn_last_step
+        self.td_lambda = td_lambda
         self._alpha_schedule = alpha
         self._epsilon_schedule = epsilon
         self._draw_ties = ties == "random"
@@ -84,3 +94,24 @@ class TabularQ:
         if not terminated:
             target += self.gamma * max(q[2 * s_next], q[2 * s_next + 1])
         q[2 * s + a] += self.alpha * (target - q[2 * s + a])
+
+    def replay(
+        self, states: Sequence[int], actions: Sequence[int], rewards: Sequence[float], over: bool
+    ) -> None:
+        """Learn from an episode, backwards, by lambda-returns.
+
+        Args:
+            states: From the first to the last, one more than actions.
+            actions: What was done in each but the last.
+            rewards: What it gave.
+            over: Whether nothing comes after the last state, because the episode terminated.
+        """
+        q, alpha, gamma = self._q, self.alpha, self.gamma
+        assert self.td_lambda is not None
+        lam = self.td_lambda
+        future = 0.0 if over else max(q[2 * states[-1]], q[2 * states[-1] + 1])
+        for t in range(len(actions) - 1, -1, -1):
+            s, a = states[t], actions[t]
+            target = rewards[t] + gamma * future
+            q[2 * s + a] += alpha * (target - q[2 * s + a])
+            future = (1 - lam) * max(q[2 * s], q[2 * s + 1]) + lam * target

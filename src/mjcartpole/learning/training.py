@@ -137,5 +137,6 @@ def _make_learner(config: TrainConfig) -> TabularQ:
         epsilon=LinearSchedule(config.epsilon, config.epsilon_final, slope),
         ties=config.ties,
         learn_last_step=config.learn_last_step,
+        td_lambda=config.td_lambda,
         rng=rng,
     )

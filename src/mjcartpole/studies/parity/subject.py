@@ -36,7 +36,7 @@ class Batch(NamedTuple):
 
 
 # Enough to stay up for a while, not always: episodes then differ in length and ending.
-_POLICY = TrainConfig.preset("tuned", episodes=250, seed=1)
+_POLICY = TrainConfig.preset("tuned", episodes=60, seed=1)
 
 
 @dataclass(frozen=True)
