@@ -10,7 +10,17 @@ import pytest
 import mjcartpole
 
 PACKAGE = Path(mjcartpole.__file__).parent
-LAYERS = ["errors", "task", "files", "physics", "media", "envs", "learning", "studies"]
+LAYERS = [
+    "errors",
+    "task",
+    "integrator",
+    "files",
+    "physics",
+    "media",
+    "envs",
+    "learning",
+    "studies",
+]
 TOP = {"commands", "parity_command", "cli", "__main__", "__init__"}
 MUJOCO_HOMES = ("physics/", "media/", "envs/vector.py", "learning/kernels.py")
 

@@ -18,8 +18,8 @@ import tyro
 from mjcartpole import __version__
 from mjcartpole.envs.backend import Backend
 from mjcartpole.errors import MjCartPoleError
+from mjcartpole.integrator import Integrator
 from mjcartpole.learning.config import TrainConfig
-from mjcartpole.physics.integrator import Integrator
 
 INTERRUPTED = 130
 COMMANDS = ("train", "evaluate", "render", "parity")

@@ -12,6 +12,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from mjcartpole.envs.backend import Backend, make_env
 from mjcartpole.files import check_writable, make_folder
+from mjcartpole.integrator import Integrator
 from mjcartpole.learning import runs
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.loop import play_episode
@@ -19,7 +20,6 @@ from mjcartpole.learning.policy import Policy
 from mjcartpole.learning.training import Training, TrainResult
 from mjcartpole.media.renderer import open_renderer
 from mjcartpole.media.video import write_video
-from mjcartpole.physics.integrator import Integrator
 from mjcartpole.physics.model import load_model
 from mjcartpole.physics.simulation import silence_mujoco
 from mjcartpole.studies import evaluation

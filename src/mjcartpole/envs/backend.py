@@ -6,7 +6,7 @@ import gymnasium
 
 from mjcartpole.envs.registration import ENV_ID
 from mjcartpole.errors import ConfigError
-from mjcartpole.physics.integrator import Integrator, check_integrator
+from mjcartpole.integrator import Integrator, check_integrator
 
 Backend = Literal["mujoco", "gym"]
 

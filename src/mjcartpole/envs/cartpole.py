@@ -13,9 +13,9 @@ from gymnasium.envs.classic_control.utils import maybe_parse_reset_bounds
 from mjcartpole import task
 from mjcartpole.envs.registration import ENV_ID
 from mjcartpole.errors import ConfigError, InvalidActionError, ResetNeededError
+from mjcartpole.integrator import Integrator
 from mjcartpole.media.renderer import Renderer, open_renderer
 from mjcartpole.media.window import Window, open_window
-from mjcartpole.physics.integrator import Integrator
 from mjcartpole.physics.model import ModelLike, load_model
 from mjcartpole.physics.simulation import (
     Simulation,

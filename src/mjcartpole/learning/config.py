@@ -10,9 +10,9 @@ from typing import Any, Final, get_args
 from mjcartpole import task
 from mjcartpole.envs.backend import Backend, check_backend
 from mjcartpole.errors import ConfigError
+from mjcartpole.integrator import Integrator
 from mjcartpole.learning.discretizer import Discretizer, is_finite
 from mjcartpole.learning.qlearning import Ties
-from mjcartpole.physics.integrator import Integrator
 
 DIMENSIONS: Final = ("x", "x_dot", "theta", "theta_dot")
 

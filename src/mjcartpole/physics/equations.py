@@ -31,7 +31,7 @@ import numpy.typing as npt
 
 from mjcartpole import task
 from mjcartpole.errors import ConfigError
-from mjcartpole.physics.integrator import Integrator, check_integrator
+from mjcartpole.integrator import Integrator, check_integrator
 
 Number: TypeAlias = float | npt.NDArray[np.float64]
 """A float or an array of them."""

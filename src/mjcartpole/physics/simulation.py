@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from mjcartpole.errors import ConfigError, SimulationError
-from mjcartpole.physics.integrator import Integrator, check_integrator
+from mjcartpole.integrator import Integrator, check_integrator
 from mjcartpole.physics.model import CartPole
 
 State = tuple[float, float, float, float]

@@ -10,8 +10,8 @@ import numpy.typing as npt
 
 from mjcartpole.envs.backend import Backend, make_env
 from mjcartpole.errors import ConfigError
+from mjcartpole.integrator import Integrator
 from mjcartpole.learning.loop import ENDINGS, Episode, play_episode
-from mjcartpole.physics.integrator import Integrator
 
 EPISODES: Final = 100
 SEED: Final = 1_000_000

@@ -5,8 +5,8 @@ import math
 import numpy as np
 from scipy.integrate import solve_ivp
 
+from mjcartpole.integrator import Integrator
 from mjcartpole.physics import equations
-from mjcartpole.physics.integrator import Integrator
 from mjcartpole.physics.model import with_options
 from mjcartpole.physics.simulation import Simulation
 from mjcartpole.studies.parity.dynamics import beyond_result

@@ -5,9 +5,9 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
+from mjcartpole.integrator import Integrator
 from mjcartpole.physics import equations
 from mjcartpole.physics.equations import Parameters
-from mjcartpole.physics.integrator import Integrator
 from mjcartpole.physics.parameters import differences
 from mjcartpole.studies.parity.subject import Batch, Subject, Vector
 

@@ -8,9 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from mjcartpole import task
+from mjcartpole.integrator import Integrator
 from mjcartpole.physics import equations
 from mjcartpole.physics.equations import Parameters, coefficients
-from mjcartpole.physics.integrator import Integrator
 from mjcartpole.studies.parity.diagnosis import likely_cause
 from mjcartpole.studies.parity.result import Figure, Result
 from mjcartpole.studies.parity.subject import Against, Batch, Subject, Vector

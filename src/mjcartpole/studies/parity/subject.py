@@ -10,12 +10,12 @@ import numpy.typing as npt
 
 from mjcartpole.envs.backend import GYM_ID
 from mjcartpole.envs.registration import ENV_ID
+from mjcartpole.integrator import Integrator
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.policy import Policy
 from mjcartpole.learning.training import Training
 from mjcartpole.physics.beyond import beyond_equations, beyond_step, overridden_masses
 from mjcartpole.physics.equations import CARTPOLE_V1, Parameters
-from mjcartpole.physics.integrator import Integrator
 from mjcartpole.physics.model import CartPole, with_options
 from mjcartpole.physics.parameters import differences, read_parameters
 from mjcartpole.physics.simulation import Simulation

@@ -1,0 +1,26 @@
+"""Physics needs no OpenGL, whatever the environment asks for."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+CODE = """
+import os, mjcartpole
+result = mjcartpole.train(mjcartpole.TrainConfig(episodes=2))
+print(result.steps > 0, os.environ["MUJOCO_GL"])
+"""
+
+
+@pytest.mark.parametrize("choice", ["nonsense", "disable", "egl", "osmesa", "glfw"])
+def test_training_works_with_any_mujoco_gl(choice):
+    done = subprocess.run(
+        [sys.executable, "-c", CODE],
+        env={**os.environ, "MUJOCO_GL": choice},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.stderr == ""
+    assert done.stdout.split() == ["True", choice]
