@@ -1,7 +1,7 @@
 """From an MJCF file to one control step.
 
-MuJoCo looks for OpenGL when it is imported, and where `MUJOCO_GL` names a backend that is not there,
-the import itself fails. Physics needs no OpenGL, so here mujoco is imported without any in that case.
+MuJoCo looks for OpenGL when it is imported, and where `MUJOCO_GL` names a backend that is not
+there, the import itself fails. Physics needs no OpenGL: in that case mujoco is imported without.
 """
 
 import os
