@@ -113,8 +113,8 @@ def test_a_run_is_evaluated_where_it_was_trained_unless_told_otherwise(run, caps
         out[backend] = json.loads(text)
         assert code == 0
     assert [out[name]["backend"] for name in out] == ["mujoco", "gym"]
-    # Thirty episodes teach little: all episodes are too short for rounding to matter.
-    assert out["mujoco"]["mean"] == out["gym"]["mean"]
+    # The physics differ by rounding, which decides how a few of the hundred episodes end.
+    assert out["mujoco"]["mean"] == pytest.approx(out["gym"]["mean"], abs=25)
 
 
 def test_a_run_keeps_the_model_that_it_was_trained_on(here, capsys):

@@ -46,7 +46,9 @@ def failures(results):
 @pytest.mark.parametrize("against", ["cartpole-v1", "itself"])
 def test_the_reference_passes_every_rung(against):
     subject, results = climb(REFERENCE, against, tuple(RUNGS))
-    assert [result.verdict for result in results.values()] == ["holds"] * len(RUNGS)
+    if results[10].verdict == "skipped":
+        assert "dm_control does not load" in results.pop(10).skipped
+    assert {result.verdict for result in results.values()} == {"holds"}
     assert subject.causes == []
     for result in results.values():
         assert any(figure.bound is not None for figure in result.figures)
