@@ -11,7 +11,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal, NoReturn
+from typing import Annotated, Any, Literal, NoReturn
 
 import tyro
 
@@ -44,8 +44,8 @@ class Train:
 
 
 @dataclass(frozen=True)
-class Evaluate:
-    """Play greedy episodes from fresh starting states, and count."""
+class _Played:
+    """What evaluating and filming have in common: a policy, and where it is played."""
 
     source: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="RUN-OR-POLICY")]
     """A run folder or a policy file."""
@@ -55,30 +55,26 @@ class Evaluate:
     """Model to play on; the run's own if left out."""
     integrator: Integrator | None = None
     """The run's own if left out."""
-    episodes: int = 100
-    """How many."""
     seed: int | None = None
     """Seeds the starting states; the same as after training if left out."""
+
+
+@dataclass(frozen=True)
+class Evaluate(_Played):
+    """Play greedy episodes from fresh starting states, and count."""
+
+    episodes: int = 100
+    """How many."""
     json: bool = False
     """Print JSON."""
 
 
 @dataclass(frozen=True)
-class Render:
-    """Film one greedy episode."""
+class Render(_Played):
+    """Film one greedy episode: the first that an evaluation with the same seed plays."""
 
-    source: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="RUN-OR-POLICY")]
-    """A run folder or a policy file."""
     output: Annotated[Path | None, tyro.conf.arg(aliases=["-o"])] = None
     """The video, .mp4 or .gif; videos/<name>.mp4 if left out."""
-    backend: Backend | None = None
-    """Who does the physics; the run's own if left out."""
-    model: str | None = None
-    """Model to play on, and to draw; the run's own if left out."""
-    integrator: Integrator | None = None
-    """The run's own if left out."""
-    seed: int | None = None
-    """Seeds the starting state; the first evaluation episode's if left out."""
     camera: str = "side"
     """A camera of the model."""
     width: int = 640
@@ -146,14 +142,14 @@ def _run(argv: list[str]) -> int:
         case Evaluate():
             return commands.run_evaluate(
                 command.source,
-                commands.Choice(command.backend, command.model, command.integrator, command.seed),
+                commands.Choice(**_choice(command)),
                 episodes=command.episodes,
                 as_json=command.json,
             )
         case Render():
             return commands.run_render(
                 command.source,
-                commands.Choice(command.backend, command.model, command.integrator, command.seed),
+                commands.Choice(**_choice(command)),
                 output=command.output,
                 camera=command.camera,
                 width=command.width,
@@ -169,6 +165,10 @@ def _run(argv: list[str]) -> int:
                 quick=command.quick,
                 output=command.json,
             )
+
+
+def _choice(command: _Played) -> dict[str, Any]:
+    return {name: getattr(command, name) for name in ("backend", "model", "integrator", "seed")}
 
 
 def parse(argv: Sequence[str]) -> Command:
