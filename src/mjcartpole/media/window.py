@@ -3,7 +3,9 @@
 import logging
 import os
 import sys
+import threading
 import time
+import warnings
 from typing import Protocol
 
 import mujoco
@@ -12,6 +14,9 @@ import numpy.typing as npt
 
 from mjcartpole import task
 from mjcartpole.physics.model import CartPole
+
+_PATIENCE = 5.0
+"""Seconds to wait for the viewer's thread."""
 
 _log = logging.getLogger("mjcartpole")
 
@@ -33,6 +38,8 @@ def open_window(cartpole: CartPole) -> Window:
     """
     if sys.platform == "linux" and not _has_screen():
         return NoWindow("neither DISPLAY nor WAYLAND_DISPLAY is set")
+    if not _window_system_answers():
+        return NoWindow("the window system does not answer")
     try:
         return ViewerWindow(cartpole)
     except (RuntimeError, mujoco.FatalError, ImportError, OSError) as error:
@@ -52,13 +59,17 @@ class ViewerWindow:
 
         self._cartpole = cartpole
         self._data = mujoco.MjData(cartpole.model)
+        before = set(threading.enumerate())
         self._viewer = mujoco.viewer.launch_passive(
             cartpole.model, self._data, show_left_ui=False, show_right_ui=False
         )
+        self._threads = set(threading.enumerate()) - before
         self._next_frame = time.monotonic()
 
     def show(self, state: npt.NDArray[np.float64]) -> None:
-        """Show a state when its time has come."""
+        """Show a state when its time has come; nothing, once a person has closed the window."""
+        if not self._viewer.is_running():
+            return
         time.sleep(max(0.0, self._next_frame - time.monotonic()))
         self._next_frame = time.monotonic() + task.CONTROL_STEP
         with self._viewer.lock():
@@ -68,8 +79,10 @@ class ViewerWindow:
         self._viewer.sync()
 
     def close(self) -> None:
-        """Close the window."""
+        """Close the window, and wait until its thread has gone: it must not outlive Python."""
         self._viewer.close()
+        for thread in self._threads:
+            thread.join(timeout=_PATIENCE)
 
 
 class NoWindow:
@@ -92,3 +105,12 @@ class NoWindow:
 
 def _has_screen() -> bool:
     return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+
+
+def _window_system_answers() -> bool:
+    """Whether GLFW starts. MuJoCo's viewer ends the whole process where it does not."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        import glfw  # noqa: PLC0415 - it looks for a window system when imported
+
+        return bool(glfw.init())
