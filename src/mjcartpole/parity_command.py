@@ -43,7 +43,9 @@ def run_parity(
     holds = all(result.verdict in {"holds", "skipped"} for result in results)
     _print_answer(subject, results, holds)
     if output:
-        write_whole(output, json.dumps(_report(subject, results, holds), indent=2) + "\n")
+        write_whole(
+            output, json.dumps(_report(subject, results, holds), indent=2, allow_nan=False) + "\n"
+        )
         print(f"\nreport {output}")
     return 0 if holds else 1
 

@@ -1,6 +1,7 @@
 """What one rung of the ladder found."""
 
 import dataclasses
+import math
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -31,6 +32,11 @@ class Figure:
         if self.bound is None:
             return True
         return self.value >= self.bound if self.at_least else self.value <= self.bound
+
+    def as_dict(self) -> dict[str, Any]:
+        """Everything, as plain values for JSON, which knows neither NaN nor infinity."""
+        value = self.value if math.isfinite(self.value) else str(self.value)
+        return {**dataclasses.asdict(self), "value": value, "holds": self.holds}
 
 
 @dataclass(frozen=True)
@@ -73,7 +79,7 @@ class Result:
             "title": self.title,
             "verdict": self.verdict,
             "reason": self.reason,
-            "figures": [{**dataclasses.asdict(f), "holds": f.holds} for f in self.figures],
+            "figures": [f.as_dict() for f in self.figures],
             "problems": list(self.problems),
             "story": list(self.story),
             "skipped": self.skipped,
