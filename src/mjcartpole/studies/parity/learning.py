@@ -57,7 +57,7 @@ def learning(subject: Subject) -> Result:
     if subject.gym_cannot:
         why = f"gymnasium cannot play this cart-pole: {subject.gym_cannot}"
         return Result(8, title, reason, skipped=why)
-    episodes, evaluations = (40, 3) if subject.quick else (400, 30)
+    episodes, evaluations = (40, 3) if subject.quick else (1_000, 30)
     jobs = [_Job(subject, seed, episodes, evaluations) for seed in range(SEEDS)]
     rows = np.array(_run_all(jobs, subject.quick))
     figures = _figures(rows[:, 0], rows[:, 1], relaxed=subject.against == "itself")
