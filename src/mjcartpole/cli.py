@@ -20,6 +20,7 @@ from mjcartpole.envs.backend import Backend
 from mjcartpole.errors import MjCartPoleError
 from mjcartpole.integrator import Integrator
 from mjcartpole.learning.config import TrainConfig
+from mjcartpole.studies.evaluation import EPISODES
 
 INTERRUPTED = 130
 COMMANDS = ("train", "evaluate", "render", "parity")
@@ -63,7 +64,7 @@ class _Played:
 class Evaluate(_Played):
     """Play greedy episodes from fresh starting states, and count."""
 
-    episodes: int = 100
+    episodes: int = EPISODES
     """How many."""
     json: bool = False
     """Print JSON."""
@@ -113,8 +114,8 @@ def main(argv: Sequence[str] | None = None) -> NoReturn:
     except MjCartPoleError as error:
         print(f"mjcartpole: error: {error}", file=sys.stderr)
         code = 2
-    except KeyboardInterrupt:
-        print("mjcartpole: interrupted", file=sys.stderr)
+    except KeyboardInterrupt as interrupt:
+        print(f"mjcartpole: {str(interrupt) or 'interrupted'}", file=sys.stderr)
         code = INTERRUPTED
     except BrokenPipeError:
         # The reader of stdout has gone (`mjcartpole … | head`): nothing is left to say.

@@ -1,7 +1,6 @@
 """What the commands do and print."""
 
 import json
-import sys
 from collections import deque
 from dataclasses import dataclass
 from pathlib import Path
@@ -29,7 +28,6 @@ RUNS = Path("runs")
 VIDEOS = Path("videos")
 RUNNING_MEAN = 100
 """Episodes in the progress bar's mean."""
-EXIT_INTERRUPTED = 130
 
 
 @dataclass(frozen=True)
@@ -57,7 +55,11 @@ class Stage:
 def run_train(
     config: TrainConfig, *, preset: str, run_dir: Path | None, video: bool, overwrite: bool
 ) -> int:
-    """Train, evaluate, film; print what came out. Returns the exit code."""
+    """Train, evaluate, film; print what came out. Returns the exit code.
+
+    Raises:
+        KeyboardInterrupt: After Ctrl-C, when what was learned is kept; the message says where.
+    """
     silence_mujoco()
     training = Training(config)
     cartpole = load_model(config.model)
@@ -78,12 +80,10 @@ def run_train(
             raise KeyboardInterrupt
         _show_result(result, folder, summary, video=video)
     except KeyboardInterrupt:
-        print(
-            f"mjcartpole: interrupted after {len(result.episodes):,} of {config.episodes:,} "
-            f"episodes; what was learned is kept in {folder}",
-            file=sys.stderr,
-        )
-        return EXIT_INTERRUPTED
+        raise KeyboardInterrupt(
+            f"interrupted after {len(result.episodes):,} of {config.episodes:,} episodes; "
+            f"what was learned is kept in {folder}"
+        ) from None
     return 0
 
 
