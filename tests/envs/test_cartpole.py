@@ -175,11 +175,29 @@ def test_pictures_have_the_size_that_was_asked_for():
     env.close()
 
 
-def test_an_unknown_camera_is_refused_with_those_that_are_there():
-    env = CartPoleEnv(render_mode="rgb_array", camera="moon")
-    env.reset(seed=0)
+@pytest.mark.parametrize("mode", ["rgb_array", "human", None])
+def test_an_unknown_camera_is_refused_with_those_that_are_there(mode):
     with pytest.raises(RenderError, match=r"moon.*side"):
-        env.render()
+        CartPoleEnv(render_mode=mode, camera="moon")
+
+
+@pytest.mark.parametrize("size", [{"width": 0}, {"height": -5}, {"width": 10**6}, {"height": 1.5}])
+def test_a_size_that_makes_no_sense_is_refused(size):
+    with pytest.raises(RenderError, match="no size of a picture"):
+        CartPoleEnv(**size)
+
+
+def test_a_window_takes_no_size():
+    with pytest.raises(ConfigError, match="a window has the size"):
+        CartPoleEnv(render_mode="human", width=320)
+
+
+def test_a_model_without_our_cameras_can_be_stepped():
+    env = CartPoleEnv(model=REFERENCE.replace('name="side"', 'name="mine"'))
+    env.reset(seed=0)
+    assert env.step(1)[1] == 1.0
+    with pytest.raises(RenderError, match="available: mine, follow"):
+        CartPoleEnv(model=env.simulation.cartpole, render_mode="rgb_array")
 
 
 def test_rendering_without_a_mode_warns():

@@ -14,7 +14,8 @@ from mjcartpole import task
 from mjcartpole.envs.registration import ENV_ID
 from mjcartpole.errors import ConfigError, InvalidActionError, ResetNeededError
 from mjcartpole.integrator import Integrator
-from mjcartpole.media.renderer import Renderer, open_renderer
+from mjcartpole.media.renderer import DEFAULT_HEIGHT, DEFAULT_WIDTH, Renderer, open_renderer
+from mjcartpole.media.scene import DEFAULT_CAMERA, check_picture
 from mjcartpole.media.window import Window, open_window
 from mjcartpole.physics.model import ModelLike, load_model
 from mjcartpole.physics.simulation import (
@@ -29,6 +30,8 @@ RenderMode = Literal["human", "rgb_array"]
 _INT64 = np.int64
 _X_LIMIT: Final = task.X_LIMIT
 _THETA_LIMIT: Final = task.THETA_LIMIT
+
+_DEFAULT_PICTURE = {"width": DEFAULT_WIDTH, "height": DEFAULT_HEIGHT, "camera": DEFAULT_CAMERA}
 
 _STEP_AFTER_END = (
     "You are calling 'step()' even though this environment has already returned "
@@ -136,21 +139,19 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int]):
         integrator: Integrator = "gym",
         sutton_barto_reward: bool = False,
         render_mode: RenderMode | None = None,
-        width: int = 640,
-        height: int = 480,
-        camera: str = "side",
+        width: int = DEFAULT_WIDTH,
+        height: int = DEFAULT_HEIGHT,
+        camera: str = DEFAULT_CAMERA,
     ) -> None:
         """Load the model; nothing is drawn and no OpenGL is touched until `render`.
 
         Raises:
             ModelError: The model cannot be found, has an error, or is no cart-pole.
-            ConfigError: The integrator or the render mode is unknown.
+            ConfigError: The integrator or the render mode is unknown, or a window is to have a
+                size.
+            RenderError: The size of a picture makes no sense, or the model has no such camera.
         """
-        if render_mode is not None and render_mode not in get_args(RenderMode):
-            raise ConfigError(
-                f"render_mode {render_mode!r} is unknown; available: None, "
-                + ", ".join(repr(mode) for mode in get_args(RenderMode))
-            )
+        _check_render_mode(render_mode, width, height)
         bound = task.observation_bound()
         self.observation_space = spaces.Box(-bound, bound, dtype=np.float32)
         self.action_space = spaces.Discrete(task.N_ACTIONS)
@@ -166,9 +167,13 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int]):
         self._observation = np.zeros(4, dtype=np.float32)
         # A view that takes single floats several times faster than the array does.
         self._cells: memoryview[float] = self._observation.data.cast("B").cast("f")
+        picture = {"width": width, "height": height, "camera": camera}
+        if render_mode == "rgb_array" or picture != _DEFAULT_PICTURE:
+            check_picture(self.simulation.cartpole, width, height, camera)
         self._open_renderer = functools.partial(
             open_renderer, self.simulation.cartpole, width=width, height=height, camera=camera
         )
+        self._open_window = functools.partial(open_window, self.simulation.cartpole, camera)
         self._renderer: Renderer | None = None
         self._window: Window | None = None
 
@@ -259,7 +264,7 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int]):
             shows a window, without a render mode, which warns, and before the first reset.
 
         Raises:
-            RenderError: The camera or the size cannot be used.
+            RenderError: No picture can be made.
         """
         if self.render_mode is None:
             logger.warn(
@@ -272,7 +277,7 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int]):
             return None
         if self.render_mode == "human":
             if self._window is None:
-                self._window = open_window(self.simulation.cartpole)
+                self._window = self._open_window()
             self._window.show(self.state)
             return None
         if self._renderer is None:
@@ -285,6 +290,19 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int]):
             if picture is not None:
                 picture.close()
         self._renderer = self._window = None
+
+
+def _check_render_mode(render_mode: str | None, width: int, height: int) -> None:
+    if render_mode is not None and render_mode not in get_args(RenderMode):
+        raise ConfigError(
+            f"render_mode {render_mode!r} is unknown; available: None, "
+            + ", ".join(repr(mode) for mode in get_args(RenderMode))
+        )
+    if render_mode == "human" and (width, height) != (DEFAULT_WIDTH, DEFAULT_HEIGHT):
+        raise ConfigError(
+            f"a window has the size that the screen gives it, not {width}x{height}; "
+            'width and height are for render_mode="rgb_array"'
+        )
 
 
 def _needs_reset(control: float) -> State:

@@ -91,6 +91,16 @@ class Scene:
         )
 
 
+def check_picture(cartpole: CartPole, width: int, height: int, camera: str) -> None:
+    """Refuse a size or a camera before there is anything to draw.
+
+    Raises:
+        RenderError: The size makes no sense, or the model has no such camera.
+    """
+    size = _pixels("width", width) / _pixels("height", height)
+    _find_camera(cartpole.model, cartpole.name, camera, size)
+
+
 def _pixels(name: str, value: int) -> int:
     try:
         pixels = operator.index(value)

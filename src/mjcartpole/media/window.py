@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from mjcartpole import task
+from mjcartpole.media.scene import DEFAULT_CAMERA
 from mjcartpole.physics.model import CartPole
 
 _PATIENCE = 5.0
@@ -31,17 +32,21 @@ class Window(Protocol):
         """Close the window."""
 
 
-def open_window(cartpole: CartPole) -> Window:
+def open_window(cartpole: CartPole, camera: str = DEFAULT_CAMERA) -> Window:
     """Open a window, or say why there is none and go on without.
 
     A program that was written for a desk should still run on a server.
+
+    Args:
+        cartpole: What to show.
+        camera: The camera that the window starts with; the viewer's own if there is no such one.
     """
     if sys.platform == "linux" and not _has_screen():
         return NoWindow("neither DISPLAY nor WAYLAND_DISPLAY is set")
     if not _window_system_answers():
         return NoWindow("the window system does not answer")
     try:
-        return ViewerWindow(cartpole)
+        return ViewerWindow(cartpole, camera)
     except (RuntimeError, mujoco.FatalError, ImportError, OSError) as error:
         return NoWindow(f"MuJoCo's viewer does not start: {error}")
 
@@ -49,7 +54,7 @@ def open_window(cartpole: CartPole) -> Window:
 class ViewerWindow:
     """MuJoCo's passive viewer, in real time."""
 
-    def __init__(self, cartpole: CartPole) -> None:
+    def __init__(self, cartpole: CartPole, camera: str) -> None:
         """Open the window.
 
         Raises:
@@ -64,6 +69,10 @@ class ViewerWindow:
             cartpole.model, self._data, show_left_ui=False, show_right_ui=False
         )
         self._threads = set(threading.enumerate()) - before
+        index = mujoco.mj_name2id(cartpole.model, mujoco.mjtObj.mjOBJ_CAMERA, camera)
+        if index >= 0:
+            self._viewer.cam.type = mujoco.mjtCamera.mjCAMERA_FIXED
+            self._viewer.cam.fixedcamid = index
         self._next_frame = time.monotonic()
 
     def show(self, state: npt.NDArray[np.float64]) -> None:
