@@ -2,7 +2,7 @@
 
 import dataclasses
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -36,10 +36,11 @@ def run_parity(
         check_writable(make_folder(output.parent))
     print(QUESTIONS[against].format(cartpole.name) + (" (quick)" if quick else ""))
     results: list[Result] = []
-    with Console(stderr=True).status("climbing …"):
-        for result in run_ladder(subject, rungs):
-            results.append(result)
-            _print_result(result)
+    console, ladder = Console(stderr=True), run_ladder(subject, rungs)
+    # While it is shown, the status takes stdout over: nothing may be printed then.
+    while (result := _next_result(console, ladder)) is not None:
+        results.append(result)
+        _print_result(result)
     holds = all(result.verdict in {"holds", "skipped"} for result in results)
     _print_answer(subject, results, holds)
     if output:
@@ -48,6 +49,11 @@ def run_parity(
         )
         print(f"\nreport {output}")
     return 0 if holds else 1
+
+
+def _next_result(console: Console, ladder: Iterator[Result]) -> Result | None:
+    with console.status("climbing …"):
+        return next(ladder, None)
 
 
 def _print_result(result: Result) -> None:
