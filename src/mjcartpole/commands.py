@@ -7,7 +7,14 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    TextColumn,
+    TimeRemainingColumn,
+    track,
+)
 
 from mjcartpole.envs.backend import Backend, make_env
 from mjcartpole.files import check_writable, make_folder
@@ -198,7 +205,11 @@ def _film(stage: Stage, path: Path, *, camera: str, width: int, height: int) -> 
     env.close()
     cartpole = load_model(stage.model)
     with open_renderer(cartpole, width=width, height=height, camera=camera) as renderer:
-        write_video(path, (renderer.render(state) for state in states))
+        console = Console(stderr=True)
+        shown = track(
+            states, "filming", console=console, transient=True, disable=not console.is_terminal
+        )
+        write_video(path, (renderer.render(state) for state in shown))
         print(
             f"video  {path}  ({episode.steps} steps, {episode.ending}; "
             f"{width}x{height}, drawn by {renderer.kind})"
