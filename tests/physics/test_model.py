@@ -192,3 +192,11 @@ def test_options_are_changed_in_a_copy():
     finer = with_options(cartpole, timestep=0.001)
     assert (finer.timestep, cartpole.timestep) == (0.001, 0.02)
     assert finer.xml == cartpole.xml
+
+
+def test_a_file_may_have_any_ending_but_a_shipped_name_comes_first(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for name in ("mine.mjcf", "cartpole"):
+        (tmp_path / name).write_text(changed("-9.8", "-1.62"), encoding="utf-8")
+    assert load_model("mine.mjcf").model.opt.gravity[2] == -1.62
+    assert load_model("cartpole").model.opt.gravity[2] == -9.8

@@ -141,6 +141,8 @@ def find_model(source: str | os.PathLike[str]) -> Path:
     shipped = models_folder() / f"{source}.xml"
     if shipped.is_file():
         return shipped
+    if path.is_file():
+        return path
     names = model_names()
     close = difflib.get_close_matches(str(source), names, n=1)
     hint = f", did you mean '{close[0]}'?" if close else ""
