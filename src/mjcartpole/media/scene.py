@@ -4,6 +4,7 @@ MuJoCo's abstract scene (geoms in world coordinates, a camera, lights) needs no 
 renderer draws from it, so that all see the same things from the same place.
 """
 
+import copy
 import operator
 from typing import Final
 
@@ -47,7 +48,7 @@ class Scene:
         """
         self.width, self.height = _pixels("width", width), _pixels("height", height)
         self.cartpole = cartpole
-        self.model = mujoco.MjModel.__copy__(cartpole.model)
+        self.model = copy.copy(cartpole.model)
         self.model.vis.global_.offwidth = self.width
         self.model.vis.global_.offheight = self.height
         self._camera = _find_camera(self.model, cartpole.name, camera, self.width / self.height)

@@ -2,7 +2,7 @@
 
 import dataclasses
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, Literal
 
 Verdict = Literal["holds", "fails", "beyond", "skipped"]
@@ -59,7 +59,7 @@ class Result:
     reason: str
     figures: tuple[Figure, ...] = ()
     problems: tuple[str, ...] = ()
-    story: tuple[str, ...] = field(default=())
+    story: tuple[str, ...] = ()
     skipped: str = ""
     beyond: bool = False
 
