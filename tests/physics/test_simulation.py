@@ -2,6 +2,7 @@
 
 import re
 
+import mujoco
 import numpy as np
 import pytest
 from hypothesis import given
@@ -9,7 +10,7 @@ from hypothesis import strategies as st
 
 from mjcartpole.errors import ConfigError, SimulationError
 from mjcartpole.physics.model import load_model
-from mjcartpole.physics.simulation import Simulation, check_sane
+from mjcartpole.physics.simulation import Simulation, check_sane, stepping_model
 
 CARTPOLE = load_model("cartpole")
 states = st.tuples(*(st.floats(-b, b) for b in (2.4, 10.0, np.pi, 10.0)))
@@ -145,3 +146,50 @@ def test_a_bad_state_does_not_start_over_in_silence():
     simulation = Simulation(CARTPOLE, "mujoco")
     simulation.state = (0.0, np.nan, 0.1, 0.0)
     assert np.isnan(simulation.step(1.0)[1])
+
+
+CONTACT = int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
+CONSTRAINT = int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
+
+
+GEOMS = '<geom contype="0" conaffinity="0" mass="0"/>'
+JOINTS = '<joint damping="0" frictionloss="0" armature="0"/>'
+SLIDER = '<joint name="slider" type="slide" axis="1 0 0"/>'
+
+
+@pytest.mark.parametrize(
+    "original, edited, off",
+    [
+        ("", "", CONTACT | CONSTRAINT),
+        (GEOMS, '<geom contype="1" conaffinity="0" mass="0"/>', CONTACT | CONSTRAINT),
+        (GEOMS, '<geom contype="1" conaffinity="1" mass="0"/>', 0),
+        (JOINTS, '<joint damping="0" frictionloss="0.1" armature="0"/>', CONTACT),
+        (SLIDER, '<joint name="slider" type="slide" axis="1 0 0" range="-2 2"/>', CONTACT),
+        ("</mujoco>", '<contact><pair geom1="rail" geom2="pole"/></contact></mujoco>', 0),
+        (
+            "</mujoco>",
+            '<equality><joint joint1="hinge" active="false"/></equality></mujoco>',
+            CONTACT,
+        ),
+    ],
+)
+def test_only_work_that_can_have_no_effect_is_left_out(original, edited, off):
+    assert original in CARTPOLE.xml
+    model = load_model(CARTPOLE.xml.replace(original, edited) if original else CARTPOLE.xml).model
+    stepped = stepping_model(model, "mujoco")
+    assert stepped.opt.disableflags & (CONTACT | CONSTRAINT) == off
+    assert model.opt.disableflags == CARTPOLE.model.opt.disableflags
+    _assert_same_motion(model, stepped)
+
+
+def _assert_same_motion(model, stepped):
+    """MuJoCo's own step of the model as it was compiled gives the same bits."""
+    one, other = mujoco.MjData(model), mujoco.MjData(stepped)
+    for data in (one, other):
+        data.qpos[:], data.qvel[:] = (0.3, 0.1), (1.5, -0.4)
+    for step in range(400):
+        one.ctrl[0] = other.ctrl[0] = 1.0 if step % 7 < 4 else -1.0
+        mujoco.mj_step(model, one)
+        mujoco.mj_step(stepped, other)
+        np.testing.assert_array_equal(one.qpos, other.qpos)
+        np.testing.assert_array_equal(one.qvel, other.qvel)
