@@ -21,7 +21,15 @@ LAYERS = [
     "learning",
     "studies",
 ]
-TOP = {"commands", "parity_command", "cli", "__main__", "__init__"}
+TOP = {
+    "signals",
+    "commands",
+    "train_command",
+    "parity_command",
+    "cli",
+    "__main__",
+    "__init__",
+}
 MUJOCO_HOMES = ("physics/", "media/", "envs/vector.py", "learning/kernels.py")
 
 SOURCES = sorted(PACKAGE.rglob("*.py"))

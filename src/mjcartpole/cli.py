@@ -5,7 +5,9 @@ after Ctrl-C. Heavy modules are imported by the command that needs them, so `--h
 """
 
 import contextlib
+import dataclasses
 import io
+import logging
 import os
 import sys
 from collections.abc import Sequence
@@ -17,9 +19,10 @@ import tyro
 
 from mjcartpole import __version__
 from mjcartpole.envs.backend import Backend
-from mjcartpole.errors import MjCartPoleError
+from mjcartpole.errors import ConfigError, MjCartPoleError
 from mjcartpole.integrator import Integrator
 from mjcartpole.learning.config import TrainConfig
+from mjcartpole.learning.engine import Engine
 from mjcartpole.studies.evaluation import EPISODES
 
 INTERRUPTED = 130
@@ -42,6 +45,18 @@ class Train:
     """Film the first evaluation episode into videos/<run's name>.mp4."""
     overwrite: bool = False
     """Replace the run that --run-dir holds."""
+    resume: Path | None = None
+    """Continue the training of this run folder, or from a checkpoint in it, as it began."""
+    engine: Engine = "compiled"
+    """Who runs the loop; both give the same bits."""
+    seeds: int = 1
+    """Train this many seeds from --seed on, side by side, and print statistics over them."""
+    workers: int | None = None
+    """How many seeds at once; as many as there are cores if left out."""
+    checkpoint_every: float = 30.0
+    """Seconds between two checkpoints."""
+    tensorboard: bool = False
+    """Write the learning curve as TensorBoard events into the run folder."""
 
 
 @dataclass(frozen=True)
@@ -116,7 +131,7 @@ def main(argv: Sequence[str] | None = None) -> NoReturn:
         code = 2
     except KeyboardInterrupt as interrupt:
         print(f"mjcartpole: {str(interrupt) or 'interrupted'}", file=sys.stderr)
-        code = INTERRUPTED
+        code = getattr(interrupt, "exit_code", INTERRUPTED)
     except BrokenPipeError:
         # The reader of stdout has gone (`mjcartpole … | head`): nothing is left to say.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -129,17 +144,12 @@ def _run(argv: list[str]) -> int:
         print(f"mjcartpole {__version__}")
         return 0
     command = parse(argv or ["--help"])
+    _report_to_stderr()
+    if isinstance(command, Train):
+        return _train(command)
     from mjcartpole import commands  # noqa: PLC0415 - it imports MuJoCo
 
     match command:
-        case Train():
-            return commands.run_train(
-                command.config,
-                preset=command.preset,
-                run_dir=command.run_dir,
-                video=command.video,
-                overwrite=command.overwrite,
-            )
         case Evaluate():
             return commands.run_evaluate(
                 command.source,
@@ -166,6 +176,58 @@ def _run(argv: list[str]) -> int:
                 quick=command.quick,
                 output=command.json,
             )
+
+
+def _train(command: Train) -> int:
+    from mjcartpole import train_command  # noqa: PLC0415 - it imports MuJoCo
+
+    how = train_command.How(
+        engine=command.engine,
+        checkpoint_every=command.checkpoint_every,
+        workers=command.workers,
+        video=command.video,
+        tensorboard=command.tensorboard,
+    )
+    if command.resume is not None:
+        _check_only_resumed(command)
+        return train_command.run_resume(command.resume, how)
+    where = train_command.Where(command.preset, command.run_dir, command.overwrite)
+    if command.seeds != 1:
+        return train_command.run_seeds(command.config, how, where, seeds=command.seeds)
+    if command.workers is not None:
+        raise ConfigError("--workers is for several --seeds")
+    return train_command.run_train(command.config, how, where)
+
+
+def _check_only_resumed(command: Train) -> None:
+    """A resumed training keeps its config: refuse flags that would be ignored."""
+    default = Train(config=TrainConfig.preset(command.preset))
+    fields = dataclasses.fields(TrainConfig)
+    given = [
+        field.name
+        for field in fields
+        if getattr(command.config, field.name) != getattr(default.config, field.name)
+    ]
+    others = ("preset", "run_dir", "overwrite", "seeds")
+    given += [name for name in others if getattr(command, name) != getattr(default, name)]
+    if given:
+        flags = ", ".join(f"--{name.replace('_', '-')}" for name in given)
+        raise ConfigError(f"--resume continues a run as it began: leave out {flags}")
+
+
+class _ToStderr(logging.Handler):
+    """One line per record on what is stderr at that time: a progress bar may have taken it over."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        print(f"mjcartpole: {record.getMessage()}", file=sys.stderr)
+
+
+def _report_to_stderr() -> None:
+    log = logging.getLogger("mjcartpole")
+    if not any(isinstance(handler, _ToStderr) for handler in log.handlers):
+        log.addHandler(_ToStderr())
+        log.setLevel(logging.INFO)
+        log.propagate = False
 
 
 def _choice(command: _Played) -> dict[str, Any]:

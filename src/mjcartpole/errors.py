@@ -12,7 +12,8 @@
     ├── SimulationError        the physics diverged
     ├── FileError              a file or folder that cannot be read or written
     │   ├── PolicyFileError        no policy, or a damaged one
-    │   └── RunError               a run folder that is missing, incomplete or in the way
+    │   └── RunError               a run folder that is missing, incomplete, in use or in the way
+    │       └── CheckpointError        a checkpoint that is damaged, or of another training
     └── RenderError            no picture or no video can be made
 
 A message says what was asked, what was found, what is available and the next step, in one line.
@@ -68,7 +69,11 @@ class PolicyFileError(FileError):
 
 
 class RunError(FileError):
-    """A run folder is missing, incomplete, or already there."""
+    """A run folder is missing, incomplete, in use, or already there."""
+
+
+class CheckpointError(RunError):
+    """A checkpoint is damaged, or of another training than it should be."""
 
 
 class RenderError(MjCartPoleError):

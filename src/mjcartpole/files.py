@@ -2,11 +2,15 @@
 
 import contextlib
 import os
+import re
 import secrets
 from collections.abc import Iterator
 from pathlib import Path
 
 from mjcartpole.errors import FileError
+
+_TEMPORARY = re.compile(r"\.[\w-]+-[0-9a-f]{8}(\.\w+)?")
+"""What `_make_temporary` calls them."""
 
 
 @contextlib.contextmanager
@@ -63,6 +67,18 @@ def check_writable(folder: Path) -> None:
         FileError: See above.
     """
     _make_temporary(folder / "probe").unlink()
+
+
+def remove_leftovers(folder: Path) -> None:
+    """Remove temporary files of writers that were killed; nobody may be writing there now."""
+    for path in folder.iterdir():
+        if is_temporary(path.name) and path.is_file():
+            path.unlink()
+
+
+def is_temporary(name: str) -> bool:
+    """Whether a file's name is one that only a writer here gives, until its file is whole."""
+    return _TEMPORARY.fullmatch(name) is not None
 
 
 def _make_temporary(target: Path) -> Path:

@@ -50,7 +50,7 @@ def has_terminated(x: float, theta: float) -> bool:
     return x < -X_LIMIT or x > X_LIMIT or theta < -THETA_LIMIT or theta > THETA_LIMIT
 
 
-def reward(*, terminated: bool, already_over: bool, sutton_barto: bool) -> float:
+def reward(terminated: bool, already_over: bool, sutton_barto: bool) -> float:
     """Reward of one control step.
 
     Args:

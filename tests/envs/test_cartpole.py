@@ -102,6 +102,33 @@ def test_observations_are_new_arrays(env):
     np.testing.assert_array_equal(first, kept)
 
 
+def test_observations_belong_to_the_caller(env):
+    """Writing into one changes nothing else, and it holds no other array's memory."""
+    for observation in (env.reset()[0], env.step(1)[0]):
+        assert observation.dtype == np.float32
+        assert observation.shape == (4,)
+        assert observation.flags.owndata
+        state = env.state
+        observation[:] = 7.0
+        np.testing.assert_array_equal(env.state, state)
+    assert np.abs(env.step(1)[0]).max() < 7.0
+
+
+def test_a_subclass_may_build_on_step_and_on_reset():
+    class Paid(CartPoleEnv):
+        def reset(self, **arguments):
+            observation, info = super().reset(**arguments)
+            return observation, info | {"lean": float(self.state[2])}
+
+        def step(self, action):
+            observation, reward, *rest = super().step(action)
+            return observation, reward + 1.0, *rest
+
+    env = Paid()
+    assert env.reset(seed=0)[1] == {"lean": env.state[2]}
+    assert env.step(1)[1] == 2.0
+
+
 def test_the_model_argument_takes_names_paths_text_and_specs(tmp_path):
     heavier = REFERENCE.replace('mass="0.1"', 'mass="0.3"')
     path = tmp_path / "heavier.xml"
@@ -158,6 +185,16 @@ def test_a_diverging_model_is_an_error_and_not_an_observation():
         for _ in range(3):
             observation, *_ = env.step(1)
             assert np.isfinite(observation).all()
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("which", [{1}, {3}, {1, 3}])
+def test_a_velocity_that_is_no_number_is_an_error_at_once(bad, which, env):
+    """The positions are still good ones: explicit Euler moved them by the old velocities."""
+    env.simulation.step = lambda control: tuple(bad if i in which else 0.0 for i in range(4))
+    env.state = np.zeros(4)
+    with pytest.raises(SimulationError, match="diverged"):
+        env.step(1)
 
 
 def test_pictures_have_the_size_that_was_asked_for():
@@ -218,6 +255,21 @@ def test_a_window_without_a_screen_is_a_word_and_no_more(monkeypatch, caplog):
     assert env.step(1)[1] == 1.0
     assert len(caplog.records) == 1
     env.close()
+
+
+@pytest.mark.parametrize("mode", ["human", "rgb_array", None])
+def test_a_window_and_nothing_else_is_drawn_at_every_reset_and_step(mode):
+    shown = []
+
+    class Watched(CartPoleEnv):
+        def render(self):
+            shown.append(self.state[2])
+
+    env = Watched(render_mode=mode)
+    env.reset(seed=0)
+    env.step(1)
+    env.step(1)
+    assert len(set(shown)) == (3 if mode == "human" else 0)
 
 
 def test_closing_twice_is_fine():

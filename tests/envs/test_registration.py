@@ -13,6 +13,10 @@ def test_registered_like_cartpole_v1():
         assert getattr(ours, field) == getattr(reference, field)
 
 
+def test_make_vec_knows_the_vector():
+    assert gymnasium.spec(ENV_ID).vector_entry_point == "mjcartpole.envs.vector:CartPoleVectorEnv"
+
+
 def test_registering_twice_does_nothing():
     before = gymnasium.registry[ENV_ID]
     register()

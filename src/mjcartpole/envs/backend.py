@@ -1,6 +1,6 @@
 """Who does the physics: our MuJoCo cart-pole or gymnasium's CartPole-v1, behind one interface."""
 
-from typing import Any, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import gymnasium
 
@@ -8,12 +8,15 @@ from mjcartpole.envs.registration import ENV_ID
 from mjcartpole.errors import ConfigError
 from mjcartpole.integrator import Integrator, check_integrator
 
+if TYPE_CHECKING:
+    from mjcartpole.physics.model import ModelLike
+
 Backend = Literal["mujoco", "gym"]
 
 GYM_ID = "CartPole-v1"
 
 
-def check_backend(backend: str, model: str, integrator: str) -> None:
+def check_backend(backend: str, model: object, integrator: str) -> None:
     """Refuse a backend that does not exist, or settings that it would ignore.
 
     Raises:
@@ -32,7 +35,7 @@ def check_backend(backend: str, model: str, integrator: str) -> None:
 
 
 def make_env(
-    backend: Backend, model: str = "cartpole", integrator: Integrator = "gym"
+    backend: Backend, model: "ModelLike" = "cartpole", integrator: Integrator = "gym"
 ) -> gymnasium.Env[Any, Any]:
     """Make the environment of a backend, with the time limit of 500 steps.
 

@@ -2,7 +2,7 @@
 
 import functools
 from collections.abc import Callable
-from typing import Any, Final, Literal, get_args
+from typing import Any, Literal, get_args
 
 import gymnasium
 import numpy as np
@@ -26,10 +26,10 @@ from mjcartpole.physics.simulation import (
 
 RenderMode = Literal["human", "rgb_array"]
 
-# What `step` needs, as plain globals: the fewest look-ups.
+# What `step` needs, as plain globals: the fewest look-ups and no sign to change.
 _INT64 = np.int64
-_X_LIMIT: Final = task.X_LIMIT
-_THETA_LIMIT: Final = task.THETA_LIMIT
+_X_MIN, _X_MAX = -task.X_LIMIT, task.X_LIMIT
+_THETA_MIN, _THETA_MAX = -task.THETA_LIMIT, task.THETA_LIMIT
 
 _DEFAULT_PICTURE = {"width": DEFAULT_WIDTH, "height": DEFAULT_HEIGHT, "camera": DEFAULT_CAMERA}
 
@@ -159,14 +159,15 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int]):
         self.simulation = Simulation(load_model(model), integrator)
         self._advance: Callable[[float], State] = _needs_reset
         self._left, self._right = self.simulation.cartpole.controls
-        self._sutton_barto_reward = sutton_barto_reward
-        self._step_reward = task.reward(
-            terminated=False, already_over=False, sutton_barto=sutton_barto_reward
+        self._step_reward, self._end_reward, self._late_reward = (
+            task.reward(terminated=over, already_over=late, sutton_barto=sutton_barto_reward)
+            for over, late in ((False, False), (True, False), (True, True))
         )
         self._steps_after_end: int | None = None
-        self._observation = np.zeros(4, dtype=np.float32)
+        observation = np.zeros(4, dtype=np.float32)
         # A view that takes single floats several times faster than the array does.
-        self._cells: memoryview[float] = self._observation.data.cast("B").cast("f")
+        self._cells: memoryview[float] = observation.data.cast("B").cast("f")
+        self._new_observation = observation.copy
         picture = {"width": width, "height": height, "camera": camera}
         if render_mode == "rgb_array" or picture != _DEFAULT_PICTURE:
             check_picture(self.simulation.cartpole, width, height, camera)
@@ -197,8 +198,9 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int]):
             ResetNeededError: There is no state yet.
             SimulationError: The physics diverged.
         """
-        # The hot path: plain floats and no look-up that can be spared.
-        kind: type = action.__class__
+        # The hot path: plain floats and no look-up that can be spared. A stored function is taken
+        # out before it is called, since `self.name()` looks for a method in all classes first.
+        kind = type(action)
         if kind is not int and kind is not _INT64 and not self.action_space.contains(action):
             raise _invalid(action)
         if action == 1:
@@ -207,10 +209,11 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int]):
             control = self._left
         else:
             raise _invalid(action)
-        x, x_dot, theta, theta_dot = self._advance(control)
+        advance = self._advance
+        x, x_dot, theta, theta_dot = advance(control)
         if (
-            -_X_LIMIT <= x <= _X_LIMIT
-            and -_THETA_LIMIT <= theta <= _THETA_LIMIT
+            _X_MIN <= x <= _X_MAX
+            and _THETA_MIN <= theta <= _THETA_MAX
             # Neither velocity is NaN or infinite. A finite one that is too large shows in the
             # position, one step later.
             and (x_dot - theta_dot) * 0.0 == 0.0
@@ -218,22 +221,26 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int]):
             terminated, reward = False, self._step_reward
         else:
             terminated, reward = True, self._end((x, x_dot, theta, theta_dot))
-        if self.render_mode == "human":
+        # None is told apart sooner than a word is.
+        if self.render_mode is not None and self.render_mode == "human":
             self.render()
-        cells = self._cells
-        cells[0], cells[1], cells[2], cells[3] = x, x_dot, theta, theta_dot
-        return self._observation.copy(), reward, terminated, False, {}
+        cells, new_observation = self._cells, self._new_observation
+        cells[0] = x
+        cells[1] = x_dot
+        cells[2] = theta
+        cells[3] = theta_dot
+        return new_observation(), reward, terminated, False, {}
 
     def _end(self, state: State) -> float:
         """Reward of a step that ends the episode, or comes after its end."""
         check_sane(state, self.simulation.cartpole.name)
-        already_over = self._steps_after_end is not None
+        if self._steps_after_end is None:
+            self._steps_after_end = 0
+            return self._end_reward
         if self._steps_after_end == 0:
             logger.warn(_STEP_AFTER_END)
-        self._steps_after_end = 0 if self._steps_after_end is None else self._steps_after_end + 1
-        return task.reward(
-            terminated=True, already_over=already_over, sutton_barto=self._sutton_barto_reward
-        )
+        self._steps_after_end += 1
+        return self._late_reward
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -250,7 +257,8 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int]):
         super().reset(seed=seed)
         low, high = maybe_parse_reset_bounds(options, task.RESET_LOW, task.RESET_HIGH)
         state = self.np_random.uniform(low=low, high=high, size=(4,))
-        self.state = state
+        self.simulation.put(*state.tolist())
+        self._advance = self.simulation.step
         self._steps_after_end = None
         if self.render_mode == "human":
             self.render()

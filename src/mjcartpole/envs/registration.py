@@ -17,6 +17,7 @@ def register() -> None:
     gymnasium.register(
         id=ENV_ID,
         entry_point="mjcartpole.envs.cartpole:CartPoleEnv",
+        vector_entry_point="mjcartpole.envs.vector:CartPoleVectorEnv",
         max_episode_steps=task.TIME_LIMIT,
         reward_threshold=task.REWARD_THRESHOLD,
     )

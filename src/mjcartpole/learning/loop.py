@@ -1,63 +1,43 @@
 """Episodes as generators over any gymnasium environment: the reference loop."""
 
 from collections.abc import Callable, Iterator
-from typing import Any, Literal, NamedTuple
+from typing import Any
 
 import gymnasium
 import numpy as np
 import numpy.typing as npt
 
-from mjcartpole import task
+from mjcartpole.errors import SimulationError
 from mjcartpole.learning.discretizer import Discretizer
+from mjcartpole.learning.episodes import ENDINGS, Episode, ending_index
 from mjcartpole.learning.qlearning import TabularQ
 
-Ending = Literal["time limit", "off the track", "pole fell"]
-ENDINGS: tuple[Ending, ...] = ("time limit", "off the track", "pole fell")
-
 State = npt.NDArray[np.float64]
-
-
-class Episode(NamedTuple):
-    """What one episode came to."""
-
-    number: int
-    total: float
-    """Undiscounted return."""
-    steps: int
-    ending: Ending
-
-
-def ending_of(terminated: bool, state: State) -> Ending:
-    """Why an episode ended, from its last state `(x, x_dot, theta, theta_dot)`."""
-    if not terminated:
-        return "time limit"
-    return "off the track" if abs(state[0]) > task.X_LIMIT else "pole fell"
 
 
 def learn_episodes(
     env: gymnasium.Env[Any, Any],
     learner: TabularQ,
     discretizer: Discretizer,
-    *,
-    episodes: int,
-    seed: int,
+    numbers: range,
 ) -> Iterator[Episode]:
     """Let a learner play and learn, one episode per item.
 
     Args:
-        env: Any environment with CartPole-v1's spaces and an end to every episode.
-        learner: Chooses actions, and learns after each step.
+        env: Any environment with CartPole-v1's spaces and an end to every episode; it draws its
+            starting states from the generator that it has.
+        learner: Chooses actions, and learns after each step or each episode.
         discretizer: From observations to the learner's states.
-        episodes: How many.
-        seed: Seeds the environment before the first episode; later ones go on from there.
+        numbers: Which episodes, counted from 0: they decide what the schedules give.
+
+    Raises:
+        SimulationError: The physics diverged; names episode and step.
     """
-    for number in range(episodes):
-        observation, _ = env.reset(seed=seed if number == 0 else None)
+    learn = _learn_stepwise if learner.td_lambda is None else _learn_afterwards
+    for number in numbers:
+        observation, _ = env.reset()
         learner.begin_episode(number)
-        if learner.td_lambda is None:
-            yield _learn_stepwise(env, learner, discretizer, observation, number)
-        else:
-            yield _learn_afterwards(env, learner, discretizer, observation, number)
+        yield learn(env, learner, discretizer, observation, number)
 
 
 def _learn_stepwise(
@@ -72,17 +52,20 @@ def _learn_stepwise(
     learn_last_step = learner.learn_last_step
     total, steps, over, terminated = 0.0, 0, False, False
     s = discretizer(observation.tolist())
-    while not over:
-        a = act(s)
-        observation, r, terminated, truncated, _ = step(a)
-        over = terminated or truncated
-        s_next = discretizer(observation.tolist())
-        if learn_last_step or not over:
-            update(s, a, float(r), s_next, terminated)
-        total += float(r)
-        steps += 1
-        s = s_next
-    return Episode(number, total, steps, ending_of(terminated, _state_of(env)))
+    try:
+        while not over:
+            a = act(s)
+            observation, r, terminated, truncated, _ = step(a)
+            over = terminated or truncated
+            s_next = discretizer(observation.tolist())
+            if learn_last_step or not over:
+                update(s, a, float(r), s_next, terminated)
+            total += float(r)
+            steps += 1
+            s = s_next
+    except SimulationError as error:
+        raise in_episode(error, number, steps) from error
+    return _ended(env, number, total, steps, terminated)
 
 
 def _learn_afterwards(
@@ -96,19 +79,32 @@ def _learn_afterwards(
     act, step = learner.act, env.step
     states, actions, rewards = [discretizer(observation.tolist())], [], []
     over = terminated = False
-    while not over:
-        a = act(states[-1])
-        observation, r, terminated, truncated, _ = step(a)
-        over = terminated or truncated
-        actions.append(a)
-        rewards.append(float(r))
-        states.append(discretizer(observation.tolist()))
+    try:
+        while not over:
+            a = act(states[-1])
+            observation, r, terminated, truncated, _ = step(a)
+            over = terminated or truncated
+            actions.append(a)
+            rewards.append(float(r))
+            states.append(discretizer(observation.tolist()))
+    except SimulationError as error:
+        raise in_episode(error, number, len(actions)) from error
     if learner.learn_last_step:
         learner.replay(states, actions, rewards, terminated)
     else:
         learner.replay(states[:-1], actions[:-1], rewards[:-1], over=False)
-    ending = ending_of(terminated, _state_of(env))
-    return Episode(number, sum(rewards), len(actions), ending)
+    return _ended(env, number, sum(rewards), len(actions), terminated)
+
+
+def in_episode(error: SimulationError, number: int, steps: int) -> SimulationError:
+    """The same error with where it happened.
+
+    Args:
+        error: What went wrong.
+        number: The episode, counted from 0.
+        steps: Its steps before that.
+    """
+    return SimulationError(f"episode {number + 1:,}, step {steps + 1}: {error}")
 
 
 def play_episode(
@@ -132,12 +128,22 @@ def play_episode(
     observation, _ = env.reset(seed=seed)
     states = [_state_of(env)]
     total, over, terminated = 0.0, False, False
-    while not over:
-        observation, r, terminated, truncated, _ = env.step(policy(observation))
-        over = terminated or truncated
-        total += float(r)
-        states.append(_state_of(env))
-    return Episode(number, total, len(states) - 1, ending_of(terminated, states[-1])), states
+    try:
+        while not over:
+            observation, r, terminated, truncated, _ = env.step(policy(observation))
+            over = terminated or truncated
+            total += float(r)
+            states.append(_state_of(env))
+    except SimulationError as error:
+        raise in_episode(error, number, len(states) - 1) from error
+    return _ended(env, number, total, len(states) - 1, terminated), states
+
+
+def _ended(
+    env: gymnasium.Env[Any, Any], number: int, total: float, steps: int, terminated: bool
+) -> Episode:
+    ending = ENDINGS[ending_index(terminated, _state_of(env)[0])]
+    return Episode(number, total, steps, ending)
 
 
 def _state_of(env: gymnasium.Env[Any, Any]) -> State:

@@ -8,7 +8,7 @@ import hashlib
 import json
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -31,10 +31,12 @@ class Policy:
     Attributes:
         discretizer: From observations to rows.
         q_table: Action values, shape (*bins, 2), float64.
+        actions: The better action of each row, shape (n_states,), int64.
     """
 
     discretizer: Discretizer
     q_table: npt.NDArray[np.float64]
+    actions: npt.NDArray[np.int64] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         expected = (*self.discretizer.bins, N_ACTIONS)
@@ -46,8 +48,9 @@ class Policy:
         if not np.isfinite(self.q_table).all():
             raise ConfigError("a table's values must be finite; this one has NaN or infinity in it")
         # The first maximum wins, as in numpy's argmax.
-        actions = np.argmax(self.q_table.reshape(-1, N_ACTIONS), axis=1).tolist()
-        object.__setattr__(self, "_actions", actions)
+        actions = np.argmax(self.q_table.reshape(-1, N_ACTIONS), axis=1).astype(np.int64)
+        object.__setattr__(self, "actions", actions)
+        object.__setattr__(self, "_actions", actions.tolist())
 
     def __call__(self, observation: npt.NDArray[np.float32] | Sequence[float]) -> int:
         """Action for an observation `(x, x_dot, theta, theta_dot)`."""

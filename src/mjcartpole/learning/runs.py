@@ -1,38 +1,56 @@
 """What a training leaves on disk.
 
 runs/<name>/
-config.json     the preset's name and the full config
-versions.json   Python, the platform and the packages
 model.xml       the model as it was, whole: it compiles to the same model anywhere
+versions.json   Python, the platform and the packages
+config.json     the preset's name and the full config; with it a training can be continued
+checkpoint.bin  while it lasts: its state (see checkpoints.py), and checkpoint-previous.bin
 episodes.csv    one line per training episode
 policy.json     the greedy policy (see policy.py)
-summary.json    what came out; written last, so its presence means a complete run
+timing.json     how long it took: the one file that differs between equal runs
+summary.json    what came out
 """
 
 import contextlib
-import csv
 import dataclasses
-import io
 import json
 import os
 import platform
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 from typing import Any, Final
 
-from mjcartpole.errors import ConfigError, ModelError, RunError
-from mjcartpole.files import check_writable, make_folder, write_whole
+import filelock
+
+from mjcartpole.errors import CheckpointError, ConfigError, FileError, ModelError, RunError
+from mjcartpole.files import (
+    check_writable,
+    is_temporary,
+    make_folder,
+    remove_leftovers,
+    write_whole,
+)
+from mjcartpole.learning.checkpoints import (
+    LATEST,
+    PREVIOUS,
+    Checkpoint,
+    keep_only,
+    load_checkpoint,
+)
 from mjcartpole.learning.config import TrainConfig
-from mjcartpole.learning.loop import Episode
+from mjcartpole.learning.episodes import ENDINGS, EpisodeLog
 from mjcartpole.learning.policy import Policy
 from mjcartpole.learning.training import TrainResult
 from mjcartpole.physics.model import CartPole, load_model, same_model
 
 CONFIG, VERSIONS, MODEL = "config.json", "versions.json", "model.xml"
-EPISODES, POLICY, SUMMARY = "episodes.csv", "policy.json", "summary.json"
-FILES: Final = (CONFIG, VERSIONS, MODEL, EPISODES, POLICY, SUMMARY)
+EPISODES, POLICY, SUMMARY, TIMING = "episodes.csv", "policy.json", "summary.json", "timing.json"
+BEGINNING: Final = (MODEL, VERSIONS, CONFIG)
+RESULTS: Final = (EPISODES, POLICY, TIMING, SUMMARY)
+FILES: Final = (*BEGINNING, *RESULTS)
+LOCK: Final = ".lock"
 
 PACKAGES: Final = ("mjcartpole", "mujoco", "dm-control", "gymnasium", "numpy", "numba", "imageio")
 
@@ -59,6 +77,27 @@ class Run:
         return self.folder / MODEL
 
 
+@dataclass(frozen=True)
+class Begun:
+    """A run whose training is not over, or whose results are not all written.
+
+    Attributes:
+        folder: Where it lies.
+        preset: Name of the preset that the config began from.
+        video: Whether a video belongs to it.
+        config: The full config.
+        cartpole: The model as it was when the training began.
+        checkpoint: Where to go on; None: at the beginning.
+    """
+
+    folder: Path
+    preset: str
+    video: bool
+    config: TrainConfig
+    cartpole: CartPole
+    checkpoint: Checkpoint | None
+
+
 def free_folder(parent: Path, name: str) -> Path:
     """The first of `parent/name`, `parent/name-2`, `parent/name-3` … that is not there."""
     folder, number = parent / name, 1
@@ -70,35 +109,60 @@ def free_folder(parent: Path, name: str) -> Path:
 
 @contextlib.contextmanager
 def claimed_folder(folder: Path, *, overwrite: bool = False) -> Iterator[None]:
-    """Make a run folder before the work begins, so that no training is lost for want of one.
+    """Hold a folder for a new run, before the work begins.
 
-    If the work fails and has left nothing in it, the folder goes again.
+    If the work fails before there is anything to go on from, what `begin_run` wrote goes again.
 
     Args:
         folder: The run folder. An empty one is taken; one that holds a run needs `overwrite`.
-        overwrite: Whether the files of a run that is there may be replaced. They stay until the
-            new ones are written.
+        overwrite: Whether a run that is there may be replaced.
 
     Raises:
-        RunError: Something is there that may not be replaced.
+        RunError: Something is there that may not be replaced, or another training is at work.
         FileError: The folder cannot be made or written.
     """
-    if folder.is_dir():
-        content = {path.name for path in folder.iterdir()}
-        if content and not content & set(FILES):
-            raise RunError(f"'{folder}' holds other files and is no run; choose another --run-dir")
-        if content and not overwrite:
-            raise RunError(
-                f"run folder '{folder}' exists; choose another --run-dir, or replace it with "
-                "--overwrite"
-            )
+    _check_free(folder, overwrite)
     make_folder(folder)
     check_writable(folder)
     try:
+        with locked_folder(folder):
+            _check_free(folder, overwrite)
+            remove_leftovers(folder)
+            before = _content(folder)
+            try:
+                yield
+            finally:
+                if not before and not {LATEST, *RESULTS} & _content(folder):
+                    _remove(folder, reversed(BEGINNING))
+    finally:
+        with contextlib.suppress(OSError):
+            folder.rmdir()  # Only an empty one goes.
+
+
+@contextlib.contextmanager
+def locked_folder(folder: Path) -> Iterator[None]:
+    """Keep other trainings out of a folder, for as long as this process lives.
+
+    Raises:
+        RunError: Another training is at work in it.
+        FileError: The folder cannot be written.
+    """
+    lock = filelock.FileLock(folder / LOCK)
+    try:
+        lock.acquire(timeout=0)
+    except filelock.Timeout:
+        raise RunError(
+            f"run folder '{folder}' is in use by another training; wait for its end, or choose "
+            "another --run-dir"
+        ) from None
+    except OSError as error:
+        raise FileError(f"cannot lock '{folder}': {error.strerror or error}") from error
+    try:
         yield
     finally:
-        if not any(folder.iterdir()):
-            folder.rmdir()
+        with contextlib.suppress(OSError):
+            (folder / LOCK).unlink()
+        lock.release()
 
 
 def check_storable(cartpole: CartPole) -> None:
@@ -120,20 +184,33 @@ def check_storable(cartpole: CartPole) -> None:
         )
 
 
-def write_run(folder: Path, result: TrainResult, cartpole: CartPole, *, preset: str) -> None:
-    """Write all files of a run except its summary, each whole or not at all.
+def begin_run(
+    folder: Path, config: TrainConfig, cartpole: CartPole, *, preset: str, video: bool = False
+) -> None:
+    """Write what a training begins from; an older run's files go.
 
     Raises:
         FileError: The folder cannot be written.
     """
-    # Without its summary a run counts as incomplete: none of these files may pass for another's.
-    (folder / SUMMARY).unlink(missing_ok=True)
-    config = {"preset": preset, **dataclasses.asdict(result.config)}
-    write_whole(folder / CONFIG, _json(config))
-    write_whole(folder / VERSIONS, _json(versions()))
+    # The config first: without it a folder holds no run, so that two are never mixed.
+    _remove(folder, (CONFIG, *FILES, LATEST, PREVIOUS))
     write_whole(folder / MODEL, cartpole.xml)
+    write_whole(folder / VERSIONS, _json(versions()))
+    about = {"preset": preset, "video": video, **dataclasses.asdict(config)}
+    write_whole(folder / CONFIG, _json(about))
+
+
+def write_results(folder: Path, result: TrainResult, summary: dict[str, Any]) -> None:
+    """Write what a training, or the part of it that was done, has come to.
+
+    Raises:
+        FileError: The folder cannot be written.
+    """
     write_whole(folder / EPISODES, _csv(result.episodes))
     result.policy.save(folder / POLICY)
+    seconds = round(result.seconds, 3)
+    write_whole(folder / TIMING, _json({"training_seconds": seconds, "steps": result.steps}))
+    write_summary(folder, summary)
 
 
 def write_summary(folder: Path, summary: dict[str, Any]) -> None:
@@ -143,6 +220,44 @@ def write_summary(folder: Path, summary: dict[str, Any]) -> None:
         FileError: The folder cannot be written.
     """
     write_whole(folder / SUMMARY, _json(summary))
+
+
+def read_summary(folder: Path) -> dict[str, Any]:
+    """A run's summary.
+
+    Raises:
+        RunError: It is not there or damaged.
+    """
+    try:
+        summary: dict[str, Any] = json.loads((folder / SUMMARY).read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise RunError(f"'{folder / SUMMARY}' cannot be read: {error}") from error
+    return summary
+
+
+def finish_run(folder: Path) -> None:
+    """Drop the checkpoints of a run that is complete."""
+    _remove(folder, (PREVIOUS, LATEST))
+
+
+def remove_run(folder: Path) -> None:
+    """Remove the files of a run, and its folder if nothing else is in it.
+
+    Raises:
+        RunError: A training is at work in it.
+    """
+    if not folder.is_dir():
+        return
+    with locked_folder(folder):
+        _remove(folder, (CONFIG, *FILES, LATEST, PREVIOUS))
+        remove_leftovers(folder)
+    with contextlib.suppress(OSError):
+        folder.rmdir()  # Only an empty one goes.
+
+
+def is_complete(folder: Path) -> bool:
+    """Whether a folder holds a run to which nothing is left to do."""
+    return (folder / SUMMARY).is_file() and not (folder / LATEST).exists()
 
 
 def load_run(folder: str | os.PathLike[str]) -> Run:
@@ -157,10 +272,63 @@ def load_run(folder: str | os.PathLike[str]) -> Run:
         raise RunError(f"no run folder or policy file '{path}'; `mjcartpole train` makes a run")
     missing = [name for name in (CONFIG, MODEL, POLICY) if not (path / name).is_file()]
     if missing:
-        raise RunError(f"'{path}' is no complete run folder: {', '.join(missing)} missing")
+        hint = f"; go on with `mjcartpole train --resume {path}`" if CONFIG not in missing else ""
+        raise RunError(f"'{path}' is no complete run folder: {', '.join(missing)} missing{hint}")
     policy = Policy.load(path / POLICY)
-    preset, config = _read_config(path / CONFIG)
+    preset, _, config = _read_config(path / CONFIG)
     return Run(path, preset, config, policy)
+
+
+@contextlib.contextmanager
+def resumed_folder(path: Path) -> Iterator[Begun]:
+    """Hold the folder of a run that is to be continued.
+
+    Args:
+        path: A run folder, for its latest checkpoint, or one checkpoint in it.
+
+    Raises:
+        RunError: There is no training to be continued, or another one is at work.
+        CheckpointError: The checkpoint is damaged or of another training; the message offers the
+            previous one, if that is good.
+        ModelError: The model was damaged.
+    """
+    folder = run_folder(path)
+    with locked_folder(folder):
+        remove_leftovers(folder)
+        begun = _load_begun(folder, path)
+        if begun.checkpoint is not None:
+            # The one that was chosen is now the latest, and a damaged one takes no place again.
+            keep_only(folder, path if path.is_file() else folder / LATEST)
+        yield begun
+
+
+def _load_begun(folder: Path, path: Path) -> Begun:
+    if not (folder / CONFIG).is_file():
+        raise RunError(
+            f"'{folder}' holds no training that could be continued; start one with "
+            f"`mjcartpole train --run-dir {folder}`"
+        )
+    preset, video, config = _read_config(folder / CONFIG)
+    try:
+        document = (folder / MODEL).read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise RunError(f"'{folder / MODEL}' cannot be read: {error}") from error
+    checkpoint = _checkpoint(folder, path, config, document)
+    cartpole = dataclasses.replace(load_model(document), name=config.model)
+    return Begun(folder, preset, video, config, cartpole, checkpoint)
+
+
+def run_folder(path: Path) -> Path:
+    """The run folder that a folder's or a checkpoint's path stands for.
+
+    Raises:
+        RunError: There is neither.
+    """
+    if path.is_dir():
+        return path
+    if path.is_file():
+        return path.parent
+    raise RunError(f"no run folder or checkpoint '{path}'; `mjcartpole train` makes a run")
 
 
 def versions() -> dict[str, str]:
@@ -174,12 +342,62 @@ def versions() -> dict[str, str]:
     return found
 
 
-def _read_config(path: Path) -> tuple[str, TrainConfig]:
+def _checkpoint(folder: Path, path: Path, config: TrainConfig, document: str) -> Checkpoint | None:
+    latest, previous = folder / LATEST, folder / PREVIOUS
+    if path.is_file():
+        return load_checkpoint(path, config, document)
+    if not latest.exists() and not previous.exists():
+        return None
+    try:
+        return load_checkpoint(latest, config, document)
+    except CheckpointError as error:
+        try:
+            older = load_checkpoint(previous, config, document)
+        except CheckpointError:
+            hint = "there is no good one before it; start again with --overwrite"
+        else:
+            hint = (
+                f"the one before it, after {older.episodes:,} episodes, is good: "
+                f"mjcartpole train --resume {previous}"
+            )
+        raise CheckpointError(f"{error}; {hint}") from error
+
+
+def _check_free(folder: Path, overwrite: bool) -> None:
+    content = _content(folder)
+    ours = {*FILES, LATEST, PREVIOUS}
+    if content and not content & ours:
+        raise RunError(f"'{folder}' holds other files and is no run; choose another --run-dir")
+    # A training that was killed in its first moment leaves no config: nothing is lost with it.
+    if CONFIG not in content and not content & set(RESULTS):
+        return
+    if not overwrite:
+        unfinished = f", go on with --resume {folder}" if not is_complete(folder) else ""
+        raise RunError(
+            f"run folder '{folder}' exists; choose another --run-dir{unfinished}, or replace it "
+            "with --overwrite"
+        )
+
+
+def _content(folder: Path) -> set[str]:
+    """Names of what lies in a folder, without what a killed training may have left behind."""
+    if not folder.is_dir():
+        return set()
+    return {path.name for path in folder.iterdir() if not is_temporary(path.name)} - {LOCK}
+
+
+def _remove(folder: Path, names: Iterable[str]) -> None:
+    for name in names:
+        (folder / name).unlink(missing_ok=True)
+
+
+def _read_config(path: Path) -> tuple[str, bool, TrainConfig]:
+    """Preset, whether there is a video, and config."""
     try:
         values: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-        preset = str(values.pop("preset"))
+        preset, video = str(values.pop("preset")), bool(values.pop("video", False))
         lists = {key: tuple(value) for key, value in values.items() if isinstance(value, list)}
-        return preset, TrainConfig(**{**values, **lists})
+        return preset, video, TrainConfig(**{**values, **lists})
     except (OSError, ValueError, TypeError, KeyError, AttributeError, ConfigError) as error:
         raise RunError(f"'{path}' is not the config of a run, or is damaged: {error}") from error
 
@@ -188,11 +406,14 @@ def _json(values: dict[str, Any]) -> str:
     return json.dumps(values, indent=2) + "\n"
 
 
-def _csv(episodes: tuple[Episode, ...]) -> str:
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["episode", "return", "steps", "ending"])
-    writer.writerows(
-        [episode.number + 1, episode.total, episode.steps, episode.ending] for episode in episodes
-    )
-    return text.getvalue()
+def _csv(log: EpisodeLog) -> str:
+    """One line per episode. There are few different ones, so each is put together once."""
+    tails: dict[tuple[float, int, int], str] = {}
+    lines = ["episode,return,steps,ending\n"]
+    columns = (column.tolist() for column in log.columns)
+    for number, episode in enumerate(zip(*columns, strict=True), start=1):
+        if episode not in tails:
+            total, steps, ending = episode
+            tails[episode] = f",{total},{steps},{ENDINGS[ending]}\n"
+        lines.append(f"{number}{tails[episode]}")
+    return "".join(lines)

@@ -19,6 +19,11 @@ class LinearSchedule:
 
     def __call__(self, episode: int) -> float:
         """Value in an episode, counted from 0."""
-        if episode >= self.episodes:
-            return self.end
-        return self.start + (self.end - self.start) * (episode / self.episodes)
+        return on_line(self.start, self.end, self.episodes, episode)
+
+
+def on_line(start: float, end: float, episodes: float, episode: int) -> float:
+    """Value of a `LinearSchedule` in an episode; Numba compiles it as it is."""
+    if episode >= episodes:
+        return end
+    return start + (end - start) * (episode / episodes)

@@ -8,14 +8,18 @@ from typing import Any, Final
 import gymnasium
 import numpy as np
 import numpy.typing as npt
+from gymnasium.utils import seeding
 
 from mjcartpole import task
 from mjcartpole.envs.backend import make_env
 from mjcartpole.learning.config import TrainConfig
-from mjcartpole.learning.loop import Episode, learn_episodes
+from mjcartpole.learning.engine import Engine, choose_engine
+from mjcartpole.learning.episodes import Columns, EpisodeLog
+from mjcartpole.learning.loop import learn_episodes
 from mjcartpole.learning.policy import Policy
 from mjcartpole.learning.qlearning import TabularQ
 from mjcartpole.learning.schedules import LinearSchedule
+from mjcartpole.physics.model import CartPole
 
 LEARNER_STREAM: Final = 1
 """Spawn key of the learner's generator: its draws are independent of the env's."""
@@ -34,7 +38,7 @@ class TrainResult:
 
     config: TrainConfig
     policy: Policy
-    episodes: tuple[Episode, ...]
+    episodes: EpisodeLog
     seconds: float
 
     @property
@@ -45,51 +49,105 @@ class TrainResult:
     @property
     def returns(self) -> npt.NDArray[np.float64]:
         """Undiscounted return of each episode, shape (episodes,)."""
-        return np.array([episode.total for episode in self.episodes])
+        return self.episodes.columns.totals
 
     @property
     def steps(self) -> int:
         """Environment steps of all episodes."""
-        return sum(episode.steps for episode in self.episodes)
+        return int(self.episodes.columns.steps.sum())
+
+
+@dataclass(frozen=True, eq=False)
+class Snapshot:
+    """All that a training needs to go on, between two episodes.
+
+    Attributes:
+        q_table: The table, shape (n_states, 2).
+        env_rng: State of the generator that draws starting states.
+        learner_rng: State of the learner's generator.
+        columns: The episodes so far, see `EpisodeLog`.
+        seconds: Time they took.
+    """
+
+    q_table: npt.NDArray[np.float64]
+    env_rng: dict[str, Any]
+    learner_rng: dict[str, Any]
+    columns: Columns
+    seconds: float
 
 
 class Training:
-    """A training that can be watched, and left at any episode.
+    """A training that can be watched, left after any chunk of episodes, and gone on with.
 
     Iterating `run()` does the work; `result()` says what has been learned so far.
+
+    Attributes:
+        config: What is trained.
+        engine: Who runs the loop.
+        learner: Learns.
+        log: The episodes that are finished.
     """
 
-    def __init__(self, config: TrainConfig, env: gymnasium.Env[Any, Any] | None = None) -> None:
+    def __init__(
+        self,
+        config: TrainConfig,
+        env: gymnasium.Env[Any, Any] | None = None,
+        *,
+        engine: Engine = "compiled",
+        cartpole: CartPole | None = None,
+    ) -> None:
         """Make the environment and the learner.
 
         Args:
             config: What to train.
-            env: Trains here instead of on the config's own environment.
+            env: Trains here instead of on the config's own environment, with the Python engine.
+            engine: Who runs the loop; where the compiled one cannot run, the other does.
+            cartpole: The config's model, if it is loaded already.
 
         Raises:
+            ConfigError: There is no such engine.
             ModelError: The model cannot be used.
         """
         self.config = config
-        self.env = env or make_env(config.backend, config.model, config.integrator)
         self.learner = _make_learner(config)
-        self.episodes: list[Episode] = []
+        self.log = EpisodeLog(config.episodes)
+        self.engine = "python" if env else choose_engine(engine, config.backend)
+        self._env_rng, _ = seeding.np_random(config.seed)
         self._seconds = 0.0
+        model = config.model if cartpole is None else cartpole
+        if self.engine == "compiled":
+            from mjcartpole.learning.compiled import CompiledLoop  # noqa: PLC0415 - it is heavy
 
-    def run(self) -> Iterator[Episode]:
-        """Train to the end, yielding each episode when it is over."""
-        config = self.config
-        started = time.perf_counter()
-        for episode in learn_episodes(
-            self.env,
-            self.learner,
-            config.discretizer,
-            episodes=config.episodes,
-            seed=config.seed,
-        ):
-            self.episodes.append(episode)
-            self._seconds = time.perf_counter() - started
-            yield episode
-        self.env.close()
+            self._loop = CompiledLoop(config.backend, model, config.integrator)
+        else:
+            self._env = env or make_env(config.backend, model, config.integrator)
+
+    def run(self) -> Iterator[int]:
+        """Train to the end.
+
+        Yields:
+            The number of finished episodes, after each or after some thousands of steps.
+
+        Raises:
+            SimulationError: The physics diverged; names episode and step.
+        """
+        numbers = range(len(self.log), self.config.episodes)
+        run = self._run_compiled if self.engine == "compiled" else self._run_python
+        before, started = self._seconds, time.perf_counter()
+        for finished in run(numbers):
+            self._seconds = before + time.perf_counter() - started
+            yield finished
+
+    def _run_compiled(self, numbers: range) -> Iterator[int]:
+        discretizer = self.config.discretizer
+        return self._loop.learn(self.learner, discretizer, self._env_rng, self.log, numbers)
+
+    def _run_python(self, numbers: range) -> Iterator[int]:
+        self._env.unwrapped.np_random = self._env_rng
+        for episode in learn_episodes(self._env, self.learner, self.config.discretizer, numbers):
+            self.log.append(episode)
+            yield len(self.log)
+        self._env.close()
 
     def result(self) -> TrainResult:
         """What has been learned so far; later episodes do not change it."""
@@ -98,12 +156,30 @@ class Training:
         return TrainResult(
             config=self.config,
             policy=Policy(discretizer, table),
-            episodes=tuple(self.episodes),
+            episodes=self.log.copy(),
             seconds=self._seconds,
         )
 
+    def snapshot(self) -> Snapshot:
+        """All that is needed to go on from here; later episodes do not change it."""
+        return Snapshot(
+            q_table=self.learner.q_table.copy(),
+            env_rng=dict(self._env_rng.bit_generator.state),
+            learner_rng=dict(self.learner.rng.bit_generator.state),
+            columns=self.log.copy().columns,
+            seconds=self._seconds,
+        )
 
-def train(config: TrainConfig | None = None) -> TrainResult:
+    def restore(self, snapshot: Snapshot) -> None:
+        """Go on from a snapshot of a training with the same config."""
+        self.learner.q_table[:] = snapshot.q_table
+        self._env_rng.bit_generator.state = snapshot.env_rng
+        self.learner.rng.bit_generator.state = snapshot.learner_rng
+        self.log = EpisodeLog.of(snapshot.columns, self.config.episodes)
+        self._seconds = snapshot.seconds
+
+
+def train(config: TrainConfig | None = None, *, engine: Engine = "compiled") -> TrainResult:
     """Train a Q-table; nothing is written.
 
     >>> result = train(TrainConfig.preset("tuned", backend="gym", seed=3, episodes=5))
@@ -114,12 +190,14 @@ def train(config: TrainConfig | None = None) -> TrainResult:
 
     Args:
         config: What to train; the preset `tuned` if left out.
+        engine: Who runs the loop, `compiled` or `python`: the results are the same, bit for bit.
 
     Raises:
+        ConfigError: There is no such engine.
         ModelError: The model cannot be used.
         SimulationError: The physics diverged.
     """
-    training = Training(config or TrainConfig())
+    training = Training(config or TrainConfig(), engine=engine)
     for _ in training.run():
         pass
     return training.result()

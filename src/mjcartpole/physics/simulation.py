@@ -45,6 +45,7 @@ class Simulation:
         self.model = stepping_model(cartpole.model, integrator)
         self.data = mujoco.MjData(self.model)
         self._qpos, self._qvel = _floats(self.data.qpos), _floats(self.data.qvel)
+        self._timer = self.data.timer[int(mujoco.mjtTimer.mjTIMER_STEP)]
         make_step = _explicit_euler if integrator == "gym" else _own_integrator
         self.step: Callable[[float], State] = make_step(self.model, self.data, cartpole)
 
@@ -67,9 +68,15 @@ class Simulation:
             raise ConfigError(
                 f"a state has 4 values (x, x_dot, theta, theta_dot), not the shape {values.shape}"
             )
+        self.put(*values.tolist())
+
+    def put(self, x: float, x_dot: float, theta: float, theta_dot: float) -> None:
+        """Put the cart-pole into a state given as plain floats, as the `state` setter does."""
+        # Where steps were timed, mj_resetData words a report of the timers, as slowly as two
+        # steps, for a log that is off. It clears the timers in any case.
+        self._timer.number = 0
         mujoco.mj_resetData(self.model, self.data)
         slider, hinge = self.cartpole.slider, self.cartpole.hinge
-        x, x_dot, theta, theta_dot = values.tolist()
         self._qpos[slider], self._qvel[slider] = x, x_dot
         self._qpos[hinge], self._qvel[hinge] = theta, theta_dot
 
@@ -214,7 +221,12 @@ def check_sane(state: State, model_name: str) -> None:
     Raises:
         SimulationError: A value is NaN, infinite or beyond `LARGEST_SANE`.
     """
-    if not all(-LARGEST_SANE < value < LARGEST_SANE for value in state):
+    x, x_dot, theta, theta_dot = state
+    low, high = -LARGEST_SANE, LARGEST_SANE
+    # Written out, since every step past an episode's end comes here.
+    if not (
+        low < x < high and low < x_dot < high and low < theta < high and low < theta_dot < high
+    ):
         raise SimulationError(
             f"the simulation of {model_name} diverged: (x, x_dot, theta, theta_dot) = {state}; "
             "look for tiny masses, huge forces or a long timestep in the model"

@@ -3,15 +3,22 @@
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import numpy.typing as npt
+from gymnasium.utils import seeding
 
-from mjcartpole.envs.backend import Backend, make_env
+from mjcartpole.envs.backend import Backend, check_backend, make_env
 from mjcartpole.errors import ConfigError
 from mjcartpole.integrator import Integrator
-from mjcartpole.learning.loop import ENDINGS, Episode, play_episode
+from mjcartpole.learning.engine import Engine, choose_engine
+from mjcartpole.learning.episodes import ENDINGS, Episode
+from mjcartpole.learning.loop import play_episode
+from mjcartpole.learning.policy import Policy
+
+if TYPE_CHECKING:
+    from mjcartpole.physics.model import ModelLike
 
 EPISODES: Final = 100
 SEED: Final = 1_000_000
@@ -61,26 +68,38 @@ def evaluate(
     policy: PolicyLike,
     *,
     backend: Backend = "mujoco",
-    model: str = "cartpole",
+    model: "ModelLike" = "cartpole",
     integrator: Integrator = "gym",
     episodes: int = EPISODES,
     seed: int = SEED,
+    engine: Engine = "compiled",
 ) -> Evaluation:
     """Play episodes from fresh starting states, without learning.
 
     Args:
         policy: From an observation to an action.
         backend: Who does the physics.
-        model: Name or path of the model, for backend mujoco.
+        model: See `load_model`; for backend mujoco.
         integrator: See `Simulation`.
         episodes: How many to play, at least 1.
         seed: Seeds the starting states.
+        engine: Who runs the loop; the compiled one needs a `Policy`, and any other function is
+            played in Python. The results are the same.
 
     Raises:
         ConfigError: A setting makes no sense.
         ModelError: The model cannot be used.
+        SimulationError: The physics diverged; names episode and step.
     """
     check_count(episodes, seed)
+    check_backend(backend, model, integrator)
+    engine = choose_engine(engine, backend)
+    if engine == "compiled" and isinstance(policy, Policy):
+        from mjcartpole.learning.compiled import CompiledLoop  # noqa: PLC0415 - it is heavy
+
+        rng, _ = seeding.np_random(seed)
+        log = CompiledLoop(backend, model, integrator).play(policy, rng, episodes)
+        return Evaluation(backend, seed, tuple(log))
     env = make_env(backend, model, integrator)
     played = tuple(
         play_episode(env, policy, number=number, seed=seed if number == 0 else None)[0]

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import stats
 
-from mjcartpole.learning.loop import ENDINGS, ending_of
+from mjcartpole.learning.episodes import ENDINGS, ending_index
 from mjcartpole.physics import equations
 from mjcartpole.studies.parity.dynamics import EPS, STEP_BOUNDS, beyond_result, step_unit
 from mjcartpole.studies.parity.result import Figure, Result
@@ -175,8 +175,8 @@ def _play(env: gymnasium.Env[Any, Any], subject: Subject, seed: int) -> Played:
         actions.append(subject.policy(observation))
         observation, _, terminated, truncated, _ = env.step(actions[-1])
         over = terminated or truncated
-    state = np.array(env.unwrapped.state)  # type: ignore[attr-defined]
-    return actions, ending_of(terminated, state)
+    x = float(env.unwrapped.state[0])  # type: ignore[attr-defined]
+    return actions, ENDINGS[ending_index(terminated, x)]
 
 
 def _ks(a: list[int], b: list[int]) -> float:

@@ -1,0 +1,215 @@
+"""The compiled engine: episodes in chunks, so that whoever waits can look, stop and save."""
+
+import logging
+from collections.abc import Callable, Iterator
+from typing import Final
+
+import numpy as np
+from numba.core import config, event
+
+from mjcartpole import task
+from mjcartpole.envs.backend import Backend
+from mjcartpole.errors import SimulationError
+from mjcartpole.integrator import Integrator
+from mjcartpole.learning import kernels
+from mjcartpole.learning.discretizer import Discretizer, Grid
+from mjcartpole.learning.episodes import EpisodeLog
+from mjcartpole.learning.loop import in_episode
+from mjcartpole.learning.policy import Policy
+from mjcartpole.learning.qlearning import TabularQ
+from mjcartpole.physics.cartpole_v1 import FORCE
+from mjcartpole.physics.model import ModelLike, load_model
+from mjcartpole.physics.simulation import Simulation, check_sane
+
+CHUNK_STEPS: Final = 50_000
+"""Steps between two looks at what else is to be done: a twentieth of a second in MuJoCo."""
+
+_ALL: Final = 2**62
+
+_log = logging.getLogger("mjcartpole")
+
+
+def unavailable(backend: Backend) -> str:
+    """Why the compiled engine cannot run here; empty if it can."""
+    if config.DISABLE_JIT:  # type: ignore[attr-defined]
+        return "NUMBA_DISABLE_JIT is set"
+    return kernels.link(kernels.libmujoco()) if backend == "mujoco" else ""
+
+
+class CompiledLoop:
+    """Plays episodes of one backend, with or without learning."""
+
+    def __init__(self, backend: Backend, model: ModelLike, integrator: Integrator) -> None:
+        """Load the model.
+
+        Args:
+            backend: Who does the physics. It must not be `unavailable`.
+            model: See `load_model`; for backend mujoco.
+            integrator: See `Simulation`; for backend mujoco.
+
+        Raises:
+            ModelError: The model cannot be used.
+        """
+        self._simulation = (
+            Simulation(load_model(model), integrator) if backend == "mujoco" else None
+        )
+        self._physics = _physics(self._simulation)
+        limit = task.TIME_LIMIT
+        self._scratch = kernels.Scratch(
+            states=np.zeros(limit + 1, np.int64),
+            actions=np.zeros(limit, np.int64),
+            rewards=np.zeros(limit, np.float64),
+            failure=np.full(5, -1.0),
+        )
+
+    def learn(
+        self,
+        learner: TabularQ,
+        discretizer: Discretizer,
+        env_rng: np.random.Generator,
+        log: EpisodeLog,
+        numbers: range,
+    ) -> Iterator[int]:
+        """Do what `learn_episodes` does, chunk by chunk.
+
+        Args:
+            learner: Learns; its table and generator are changed in place.
+            discretizer: From observations to the learner's states.
+            env_rng: Draws the starting states.
+            log: Takes the episodes; it holds those before `numbers`.
+            numbers: Which episodes, counted from 0: they decide what the schedules give.
+
+        Yields:
+            The number of episodes in the log.
+
+        Raises:
+            SimulationError: The physics diverged; names episode and step.
+        """
+        common = (
+            self._physics,
+            _arrays(discretizer.grid),
+            _method(learner),
+            learner.q_table.reshape(-1),
+            (env_rng, learner.rng),
+        )
+        number = numbers.start
+        while number < numbers.stop:
+            number = _run(
+                kernels.learn_chunk,
+                *common,
+                (number, numbers.stop),
+                CHUNK_STEPS,
+                log.storage,
+                self._scratch,
+            )
+            log.extend_to(number)
+            self._check(number)
+            yield number
+
+    def play(self, policy: Policy, env_rng: np.random.Generator, episodes: int) -> EpisodeLog:
+        """Play greedy episodes, as `play_episode` does.
+
+        Raises:
+            SimulationError: The physics diverged; names episode and step.
+        """
+        log = EpisodeLog(episodes)
+        number = _run(
+            kernels.play_chunk,
+            self._physics,
+            _arrays(policy.discretizer.grid),
+            policy.actions,
+            env_rng,
+            (0, episodes),
+            _ALL,
+            log.storage,
+            self._scratch.failure,
+        )
+        self._check(number)
+        log.extend_to(number)
+        return log
+
+    def _check(self, number: int) -> None:
+        """Raise what a diverging simulation has left behind."""
+        steps, *state = self._scratch.failure.tolist()
+        if steps < 0:
+            return
+        assert self._simulation is not None
+        try:
+            x, x_dot, theta, theta_dot = state
+            check_sane((x, x_dot, theta, theta_dot), self._simulation.cartpole.name)
+        except SimulationError as error:
+            raise in_episode(error, number, int(steps)) from error
+
+
+def _physics(simulation: Simulation | None) -> kernels.Physics:
+    if simulation is None:
+        return kernels.GymPhysics(-FORCE, FORCE)
+    cartpole, model, data = simulation.cartpole, simulation.model, simulation.data
+    left, right = cartpole.controls
+    return kernels.MujocoPhysics(
+        model=model._address,
+        data=data._address,
+        qpos=data.qpos,
+        qvel=data.qvel,
+        ctrl=data.ctrl,
+        slider=cartpole.slider,
+        hinge=cartpole.hinge,
+        left=left,
+        right=right,
+        timestep=float(model.opt.timestep),
+        substeps=cartpole.substeps,
+        explicit=simulation.integrator == "gym",
+    )
+
+
+def _arrays(grid: Grid) -> Grid:
+    """The grid as arrays: tuples of each length would be compiled anew."""
+    return Grid(
+        np.array(grid.dimensions, np.int64),
+        np.array(grid.bins, np.int64),
+        np.array(grid.low, np.float64),
+        np.array(grid.high, np.float64),
+        np.array(grid.width, np.float64),
+    )
+
+
+def _method(learner: TabularQ) -> kernels.Method:
+    alpha, epsilon = learner.alpha_schedule, learner.epsilon_schedule
+    return kernels.Method(
+        gamma=float(learner.gamma),
+        td_lambda=float(learner.td_lambda or 0.0),
+        stepwise=learner.td_lambda is None,
+        draw_ties=learner.draw_ties,
+        learn_last_step=learner.learn_last_step,
+        alpha=float(alpha.start),
+        alpha_final=float(alpha.end),
+        epsilon=float(epsilon.start),
+        epsilon_final=float(epsilon.end),
+        slope=float(alpha.episodes),
+    )
+
+
+class _Announcer(event.Listener):
+    """Says once per process that the waiting is for the compiler."""
+
+    said = False
+
+    def on_start(self, event: event.Event) -> None:
+        if not _Announcer.said:
+            _Announcer.said = True
+            _log.info(
+                "compiling the training loop, which takes a few seconds once; "
+                "later runs load it from the cache"
+            )
+
+    def on_end(self, event: event.Event) -> None:
+        pass
+
+
+def _run(kernel: Callable[..., int], *arguments: object) -> int:
+    with event.install_listener("numba:compile", _Announcer()):
+        try:
+            return kernel(*arguments)
+        except OSError:
+            # It is compiled, but the cache cannot be written (a full disk): go on without.
+            return kernel(*arguments)

@@ -1,0 +1,47 @@
+"""Who runs the loop: the compiled engine, or the reference loop in Python."""
+
+import logging
+from typing import Literal, get_args
+
+from mjcartpole.envs.backend import Backend
+from mjcartpole.errors import ConfigError
+
+Engine = Literal["compiled", "python"]
+"""`compiled`: the loop compiled by Numba; `python`: the same in Python. They give the same bits."""
+
+_log = logging.getLogger("mjcartpole")
+_said: set[str] = set()
+
+
+def choose_engine(engine: str, backend: Backend) -> Engine:
+    """The engine that was asked for, or the reference loop where that one cannot run.
+
+    Logs one line, once, where the reference loop takes over.
+
+    Raises:
+        ConfigError: There is no such engine.
+    """
+    if engine not in get_args(Engine):
+        raise ConfigError(f"engine {engine!r} is unknown; available: {', '.join(get_args(Engine))}")
+    if engine == "python":
+        return "python"
+    why_not = _why_not_compiled(backend)
+    if not why_not:
+        return "compiled"
+    if why_not not in _said:
+        _said.add(why_not)
+        _log.warning(
+            "the compiled engine cannot run here (%s); the Python engine takes over: "
+            "the same results, later",
+            why_not,
+        )
+    return "python"
+
+
+def _why_not_compiled(backend: Backend) -> str:
+    try:
+        # Numba is heavy, and refuses to be imported beside a NumPy that is newer than it knows.
+        from mjcartpole.learning import compiled  # noqa: PLC0415
+    except (ImportError, OSError) as error:
+        return f"Numba does not work: {error}"
+    return compiled.unavailable(backend)

@@ -1,0 +1,129 @@
+"""What an episode came to, and the log of all episodes of a training."""
+
+from collections.abc import Iterator, Sequence
+from typing import Final, Literal, NamedTuple, Self, overload
+
+import numpy as np
+import numpy.typing as npt
+
+from mjcartpole import task
+
+Ending = Literal["time limit", "off the track", "pole fell"]
+ENDINGS: Final[tuple[Ending, ...]] = ("time limit", "off the track", "pole fell")
+
+_TOUCHED: Final = 10_000_000
+"""Episodes whose memory is claimed at the start, so that a long training does not grow."""
+
+
+class Episode(NamedTuple):
+    """What one episode came to."""
+
+    number: int
+    total: float
+    """Undiscounted return."""
+    steps: int
+    ending: Ending
+
+
+def ending_index(terminated: bool, x: float) -> int:
+    """Why an episode ended, as an index of `ENDINGS`.
+
+    Args:
+        terminated: Whether the rules ended it.
+        x: The cart's last position, m.
+    """
+    if not terminated:
+        return 0
+    return 1 if abs(x) > task.X_LIMIT else 2
+
+
+class Columns(NamedTuple):
+    """Episodes in columns, each of shape (n,): thirteen bytes for an episode."""
+
+    totals: npt.NDArray[np.float64]
+    steps: npt.NDArray[np.int32]
+    endings: npt.NDArray[np.int8]
+    """Indices of `ENDINGS`."""
+
+
+class EpisodeLog(Sequence[Episode]):
+    """The episodes of a training.
+
+    Attributes:
+        storage: Columns for as many as it can take; the first `len(log)` entries count.
+    """
+
+    def __init__(self, capacity: int) -> None:
+        """An empty log.
+
+        Args:
+            capacity: The most episodes that it can take.
+        """
+        self.storage = Columns(
+            np.empty(capacity, np.float64),
+            np.empty(capacity, np.int32),
+            np.empty(capacity, np.int8),
+        )
+        self._length = 0
+        for column in self.storage:
+            column[:_TOUCHED] = 0
+
+    @classmethod
+    def of(cls, columns: Columns, capacity: int) -> Self:
+        """A log that begins with the episodes of other columns."""
+        log = cls(capacity)
+        log._length = len(columns.totals)
+        log._put(slice(log._length), *columns)
+        return log
+
+    @property
+    def columns(self) -> Columns:
+        """The episodes so far, each column of shape (len(log),); views."""
+        totals, steps, endings = self.storage
+        n = self._length
+        return Columns(totals[:n], steps[:n], endings[:n])
+
+    def append(self, episode: Episode) -> None:
+        """Add the next episode."""
+        self._put(self._length, episode.total, episode.steps, ENDINGS.index(episode.ending))
+        self._length += 1
+
+    def extend_to(self, length: int) -> None:
+        """Count episodes as logged that were written straight into the storage."""
+        self._length = length
+
+    def copy(self) -> Self:
+        """The episodes so far, which later ones do not change."""
+        return type(self).of(self.columns, self._length)
+
+    def __len__(self) -> int:
+        return self._length
+
+    @overload
+    def __getitem__(self, index: int) -> Episode: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[Episode]: ...
+    def __getitem__(self, index: int | slice) -> Episode | list[Episode]:
+        if isinstance(index, slice):
+            return [self._at(i) for i in range(*index.indices(self._length))]
+        if not -self._length <= index < self._length:
+            raise IndexError(f"the log has {self._length} episodes, none at {index}")
+        return self._at(index % self._length)
+
+    def __iter__(self) -> Iterator[Episode]:
+        return (self._at(index) for index in range(self._length))
+
+    def _at(self, index: int) -> Episode:
+        totals, steps, endings = self.storage
+        ending = ENDINGS[endings[index]]
+        return Episode(index, float(totals[index]), int(steps[index]), ending)
+
+    def _put(
+        self,
+        where: int | slice,
+        totals: npt.ArrayLike,
+        steps: npt.ArrayLike,
+        endings: npt.ArrayLike,
+    ) -> None:
+        storage = self.storage
+        storage.totals[where], storage.steps[where], storage.endings[where] = totals, steps, endings

@@ -1,0 +1,159 @@
+"""The folder of many seeds.
+
+runs/<name>/
+model.xml       the model as it was
+seeds.json      preset, config and seeds; with it the work can be continued
+seed-<n>/       a run (see learning/runs.py) for each seed, as if it were trained alone
+seeds.csv       one line per seed
+aggregate.json  statistics over the seeds
+"""
+
+import contextlib
+import dataclasses
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from mjcartpole.errors import ConfigError, ModelError, RunError
+from mjcartpole.files import check_writable, make_folder, remove_leftovers, write_whole
+from mjcartpole.learning import runs
+from mjcartpole.learning.config import TrainConfig
+from mjcartpole.physics.model import CartPole, load_model
+from mjcartpole.studies.seeds import ManyResult
+
+SEEDS, TABLE, AGGREGATE = "seeds.json", "seeds.csv", "aggregate.json"
+FILES: Final = (SEEDS, TABLE, AGGREGATE, runs.MODEL)
+
+
+@dataclass(frozen=True)
+class ManyBegun:
+    """Many seeds that are to be continued.
+
+    Attributes:
+        preset: Name of the preset that the config began from.
+        config: The config; its seed is the first.
+        seeds: Which.
+        cartpole: The model as it was when the work began.
+    """
+
+    preset: str
+    config: TrainConfig
+    seeds: tuple[int, ...]
+    cartpole: CartPole
+
+
+def seed_folder(folder: Path, seed: int) -> Path:
+    """Where one seed's run lies."""
+    return folder / f"seed-{seed}"
+
+
+@contextlib.contextmanager
+def claimed_seeds(folder: Path, *, overwrite: bool = False) -> Iterator[None]:
+    """Hold a folder for many seeds; see `claimed_folder`.
+
+    Raises:
+        RunError: Something is there that may not be replaced, or another training is at work.
+        FileError: The folder cannot be made or written.
+    """
+    _check_free(folder, overwrite)
+    make_folder(folder)
+    check_writable(folder)
+    try:
+        with runs.locked_folder(folder):
+            if (folder / SEEDS).exists():
+                _clear(folder)
+            remove_leftovers(folder)
+            yield
+    finally:
+        with contextlib.suppress(OSError):
+            folder.rmdir()  # Only an empty one goes.
+
+
+def begin_seeds(
+    folder: Path, config: TrainConfig, seeds: tuple[int, ...], cartpole: CartPole, *, preset: str
+) -> None:
+    """Write what the work begins from.
+
+    Raises:
+        FileError: The folder cannot be written.
+    """
+    write_whole(folder / runs.MODEL, cartpole.xml)
+    about = {"preset": preset, "seeds": list(seeds), "config": dataclasses.asdict(config)}
+    write_whole(folder / SEEDS, json.dumps(about, indent=2) + "\n")
+
+
+@contextlib.contextmanager
+def resumed_seeds(folder: Path) -> Iterator[ManyBegun]:
+    """Hold a folder of many seeds whose work is to be continued.
+
+    Raises:
+        RunError: It is damaged, or another training is at work in it.
+    """
+    with runs.locked_folder(folder):
+        remove_leftovers(folder)
+        yield _load(folder)
+
+
+def write_seeds(folder: Path, many: ManyResult) -> None:
+    """Write the table of the seeds and the statistics over them.
+
+    Raises:
+        FileError: The folder cannot be written.
+    """
+    write_whole(folder / TABLE, _csv(many))
+    aggregate = many.aggregate()
+    summary = {
+        "seeds": len(many.seeds),
+        "failed": {str(found.seed): found.error for found in many.failed},
+        "greedy_return": None if aggregate is None else aggregate.summary(),
+    }
+    write_whole(folder / AGGREGATE, json.dumps(summary, indent=2) + "\n")
+
+
+def _csv(many: ManyResult) -> str:
+    lines = ["seed,mean,minimum,failed"]
+    for found in many.seeds:
+        figures = found.evaluation or {"mean": "", "minimum": ""}
+        failed = "yes" if found.error else "no"
+        lines.append(f"{found.seed},{figures['mean']},{figures['minimum']},{failed}")
+    return "\n".join(lines) + "\n"
+
+
+def _check_free(folder: Path, overwrite: bool) -> None:
+    content = {path.name for path in folder.iterdir()} if folder.is_dir() else set()
+    if not content - {runs.LOCK, runs.MODEL}:
+        return
+    if SEEDS not in content:
+        raise RunError(
+            f"'{folder}' holds other files than the runs of many seeds; choose another --run-dir"
+        )
+    if not overwrite:
+        raise RunError(
+            f"run folder '{folder}' exists; choose another --run-dir, go on with "
+            f"--resume {folder}, or replace it with --overwrite"
+        )
+
+
+def _clear(folder: Path) -> None:
+    """Remove the runs of all seeds that a folder names, and nothing else."""
+    for seed in _load(folder).seeds:
+        runs.remove_run(seed_folder(folder, seed))
+    for name in FILES:
+        (folder / name).unlink(missing_ok=True)
+
+
+def _load(folder: Path) -> ManyBegun:
+    path = folder / SEEDS
+    try:
+        about: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        config = TrainConfig(**about["config"])
+        seeds = tuple(int(seed) for seed in about["seeds"])
+        cartpole = load_model((folder / runs.MODEL).read_text(encoding="utf-8"))
+        preset = str(about["preset"])
+    except (OSError, ValueError, TypeError, KeyError, ConfigError, ModelError) as error:
+        raise RunError(
+            f"'{path}' does not name the seeds of a run, or is damaged: {error}"
+        ) from error
+    return ManyBegun(preset, config, seeds, dataclasses.replace(cartpole, name=config.model))

@@ -1,0 +1,335 @@
+"""One config, many seeds, side by side: each as if it were trained alone."""
+
+import concurrent.futures
+import contextlib
+import dataclasses
+import multiprocessing
+import os
+import signal
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from multiprocessing.synchronize import Event
+from pathlib import Path
+from typing import Any
+
+from mjcartpole import task
+from mjcartpole.errors import ConfigError, MjCartPoleError, RunError
+from mjcartpole.learning import runs
+from mjcartpole.learning.checkpoints import Checkpoint
+from mjcartpole.learning.config import TrainConfig
+from mjcartpole.learning.engine import Engine, choose_engine
+from mjcartpole.learning.session import CHECKPOINT_EVERY, Session
+from mjcartpole.learning.training import Training, TrainResult
+from mjcartpole.physics.model import CartPole, load_model
+from mjcartpole.studies.conduct import conclude, evaluate_where_trained
+from mjcartpole.studies.statistics import Aggregate, aggregate
+
+MAX_SEEDS = 100_000
+
+
+@dataclass(frozen=True, eq=False)
+class SeedResult:
+    """What one seed has come to.
+
+    Attributes:
+        seed: The seed.
+        evaluation: Figures of the greedy evaluation (see `Evaluation.summary`); None if the seed
+            failed or was stopped.
+        result: What was learned; None if the seed failed, or was complete on disk before.
+        error: Why it failed; empty if it did not.
+    """
+
+    seed: int
+    evaluation: dict[str, Any] | None = None
+    result: TrainResult | None = None
+    error: str = ""
+
+    @property
+    def score(self) -> float | None:
+        """Mean greedy return."""
+        return None if self.evaluation is None else float(self.evaluation["mean"])
+
+
+@dataclass(frozen=True, eq=False)
+class ManyResult:
+    """What many seeds have come to.
+
+    Attributes:
+        config: What was trained; its seed is the first.
+        seeds: One result for each, in order.
+    """
+
+    config: TrainConfig
+    seeds: tuple[SeedResult, ...]
+
+    @property
+    def scores(self) -> list[float]:
+        """Mean greedy return of each seed that was evaluated."""
+        return [found.score for found in self.seeds if found.score is not None]
+
+    @property
+    def failed(self) -> list[SeedResult]:
+        """The seeds that ended in an error."""
+        return [found for found in self.seeds if found.error]
+
+    def aggregate(self) -> Aggregate | None:
+        """Statistics over the scores; None where there are none."""
+        if not self.scores:
+            return None
+        return aggregate(self.scores, solved_at=task.REWARD_THRESHOLD)
+
+
+@dataclass(frozen=True)
+class _Job:
+    """One seed, in a form that another process can be given."""
+
+    config: TrainConfig
+    engine: Engine
+    document: str | None
+    """The model's, where it is loaded already."""
+    folder: Path | None
+    preset: str
+    every: float
+    events: bool
+
+
+def train_many(
+    config: TrainConfig,
+    seeds: int | Sequence[int],
+    *,
+    workers: int | None = None,
+    engine: Engine = "compiled",
+) -> ManyResult:
+    """Train one config with many seeds at once; nothing is written.
+
+    >>> many = train_many(TrainConfig(episodes=5, backend="gym"), seeds=3, workers=2)
+    >>> [found.seed for found in many.seeds]
+    [0, 1, 2]
+    >>> many.aggregate().count
+    3
+
+    Args:
+        config: What to train.
+        seeds: Which seeds; a number stands for that many from the config's own seed on.
+        workers: How many at once; as many as there are cores if left out. The compiled engine runs
+            in threads, since it leaves Python's lock alone, and the Python engine in processes.
+        engine: Who runs the loop.
+
+    Raises:
+        ConfigError: The seeds or workers make no sense.
+        ModelError: The model cannot be used.
+    """
+    cartpole = load_model(config.model)
+    crew = Crew(config, seeds, cartpole, workers=workers, engine=engine)
+    for _ in crew.run(lambda: False):
+        pass
+    return crew.result()
+
+
+class Crew:
+    """Many seeds at work; iterating `run()` does it, `result()` says what it has come to.
+
+    Attributes:
+        seeds: Which.
+        workers: How many at once.
+    """
+
+    def __init__(
+        self,
+        config: TrainConfig,
+        seeds: int | Sequence[int],
+        cartpole: CartPole,
+        *,
+        workers: int | None = None,
+        engine: Engine = "compiled",
+        folder: Path | None = None,
+        preset: str = "tuned",
+        every: float = CHECKPOINT_EVERY,
+        events: bool = False,
+    ) -> None:
+        """Plan the work.
+
+        Args:
+            config: What to train.
+            seeds: Which seeds; a number stands for that many from the config's own seed on.
+            cartpole: The config's model.
+            workers: How many at once; as many as there are cores if left out.
+            engine: Who runs the loop.
+            folder: Keeps a run per seed in here, `seed-<n>`; runs that are there go on.
+            preset: Name of the preset that the config began from.
+            every: Seconds between two checkpoints of a run.
+            events: Write TensorBoard events for each run.
+
+        Raises:
+            ConfigError: The seeds or workers make no sense.
+        """
+        self.seeds = _check_seeds(config, seeds)
+        self.workers = min(_check_workers(workers), len(self.seeds))
+        self._config = config
+        self._engine = choose_engine(engine, config.backend)
+        self._jobs = [
+            _Job(
+                config=dataclasses.replace(config, seed=seed),
+                engine=self._engine,
+                document=cartpole.xml if config.backend == "mujoco" else None,
+                folder=None if folder is None else folder / f"seed-{seed}",
+                preset=preset,
+                every=every,
+                events=events,
+            )
+            for seed in self.seeds
+        ]
+        self._found: dict[int, SeedResult] = {}
+
+    def run(self, stop: Callable[[], bool]) -> Iterator[SeedResult | None]:
+        """Train all seeds, or until `stop()` is true.
+
+        Yields:
+            Each seed's result when it has come, and None now and then while waiting.
+        """
+        work = self._in_threads if self._engine == "compiled" else self._in_processes
+        for found in work(stop):
+            if found is not None:
+                self._found[found.seed] = found
+            yield found
+
+    def result(self) -> ManyResult:
+        """The seeds that have come to something, in order."""
+        return ManyResult(
+            self._config, tuple(self._found[seed] for seed in self.seeds if seed in self._found)
+        )
+
+    def _in_threads(self, stop: Callable[[], bool]) -> Iterator[SeedResult | None]:
+        with concurrent.futures.ThreadPoolExecutor(self.workers) as pool:
+            yield from _as_they_come([pool.submit(_train_seed, job, stop) for job in self._jobs])
+
+    def _in_processes(self, stop: Callable[[], bool]) -> Iterator[SeedResult | None]:
+        # A fresh interpreter each: nothing of OpenGL or threads is inherited.
+        spawn = multiprocessing.get_context("spawn")
+        stopped = spawn.Event()
+        with concurrent.futures.ProcessPoolExecutor(
+            self.workers, mp_context=spawn, initializer=_begin_worker, initargs=(stopped,)
+        ) as pool:
+            futures = [pool.submit(_train_seed_in_worker, job) for job in self._jobs]
+            for found in _as_they_come(futures):
+                if stop():
+                    stopped.set()
+                yield found
+
+
+def _as_they_come(
+    futures: "list[concurrent.futures.Future[SeedResult]]",
+) -> Iterator[SeedResult | None]:
+    waiting = set(futures)
+    while waiting:
+        done, waiting = concurrent.futures.wait(
+            waiting, timeout=0.1, return_when=concurrent.futures.FIRST_COMPLETED
+        )
+        yield from (future.result() for future in done)
+        yield None
+
+
+_stopped: Event | None = None
+
+
+def _begin_worker(stopped: Event) -> None:
+    """Leave signals to the process that began the work; it says when to stop."""
+    global _stopped  # noqa: PLW0603 - the pool has no other way to hand an event over
+    _stopped = stopped
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _train_seed_in_worker(job: _Job) -> SeedResult:
+    assert _stopped is not None
+    return _train_seed(job, _stopped.is_set)
+
+
+def _train_seed(job: _Job, stop: Callable[[], bool]) -> SeedResult:
+    seed = job.config.seed
+    if stop():
+        return SeedResult(seed)
+    try:
+        cartpole = _model_of(job)
+        if job.folder is None:
+            return _train_in_memory(job, cartpole, stop)
+        return _train_on_disk(job, job.folder, cartpole, stop)
+    except MjCartPoleError as error:
+        return SeedResult(seed, error=str(error))
+    except MemoryError:
+        return SeedResult(seed, error="out of memory")
+
+
+def _model_of(job: _Job) -> CartPole:
+    if job.document is None:
+        return load_model()
+    return dataclasses.replace(load_model(job.document), name=job.config.model)
+
+
+def _train_in_memory(job: _Job, cartpole: CartPole, stop: Callable[[], bool]) -> SeedResult:
+    training = Training(job.config, engine=job.engine, cartpole=cartpole)
+    for _ in training.run():
+        if stop():
+            return SeedResult(job.config.seed)
+    result = training.result()
+    evaluation = evaluate_where_trained(result, cartpole, job.engine)
+    return SeedResult(job.config.seed, evaluation.summary(), result)
+
+
+def _train_on_disk(
+    job: _Job, folder: Path, cartpole: CartPole, stop: Callable[[], bool]
+) -> SeedResult:
+    seed = job.config.seed
+    if runs.is_complete(folder):
+        return SeedResult(seed, runs.read_summary(folder).get("evaluation"))
+    training = Training(job.config, engine=job.engine, cartpole=cartpole)
+    session = Session(folder, training, cartpole, every=job.every)
+    with _begun(job, folder, cartpole) as checkpoint:
+        session.resume(checkpoint)
+        for _ in session.run(stop):
+            pass
+        result, _, evaluation = conclude(
+            session, folder, cartpole, preset=job.preset, events=job.events
+        )
+        if evaluation is None:
+            return SeedResult(seed)
+        runs.finish_run(folder)
+    return SeedResult(seed, evaluation.summary(), result)
+
+
+@contextlib.contextmanager
+def _begun(job: _Job, folder: Path, cartpole: CartPole) -> Iterator[Checkpoint | None]:
+    """Hold a seed's folder; yields where to go on."""
+    if (folder / runs.CONFIG).is_file():
+        with runs.resumed_folder(folder) as begun:
+            if begun.config != job.config:
+                raise RunError(f"'{folder}' holds a run with another config")
+            yield begun.checkpoint
+    else:
+        with runs.claimed_folder(folder):
+            runs.begin_run(folder, job.config, cartpole, preset=job.preset)
+            yield None
+
+
+def _check_seeds(config: TrainConfig, seeds: int | Sequence[int]) -> tuple[int, ...]:
+    if isinstance(seeds, int):
+        if not 1 <= seeds <= MAX_SEEDS:
+            raise ConfigError(f"seeds must be a number from 1 to {MAX_SEEDS:,}, not {seeds}")
+        return tuple(range(config.seed, config.seed + seeds))
+    if not seeds or len(set(seeds)) != len(seeds):
+        raise ConfigError(f"seeds must be different numbers, at least one, not {list(seeds)}")
+    return tuple(seeds)
+
+
+def _check_workers(workers: int | None) -> int:
+    if workers is None:
+        return available_cores()
+    if workers < 1:
+        raise ConfigError(f"workers must be a number from 1 up, not {workers}")
+    return workers
+
+
+def available_cores() -> int:
+    """Cores that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1

@@ -1,0 +1,327 @@
+"""What `train` does and prints."""
+
+import dataclasses
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    ProgressColumn,
+    TextColumn,
+    TimeRemainingColumn,
+)
+
+from mjcartpole.commands import RUNS, VIDEOS, Stage, film, print_evaluation
+from mjcartpole.files import check_writable, make_folder
+from mjcartpole.learning import runs, tensorboard
+from mjcartpole.learning.checkpoints import LATEST
+from mjcartpole.learning.config import TrainConfig
+from mjcartpole.learning.engine import Engine
+from mjcartpole.learning.session import CHECKPOINT_EVERY, Session, check_interval
+from mjcartpole.learning.training import Training, TrainResult
+from mjcartpole.physics.model import CartPole, load_model
+from mjcartpole.physics.simulation import silence_mujoco
+from mjcartpole.signals import Interrupted, StopSignals
+from mjcartpole.studies import evaluation, seed_runs
+from mjcartpole.studies.conduct import conclude
+from mjcartpole.studies.seeds import Crew, ManyResult
+from mjcartpole.studies.statistics import CONFIDENCE
+
+RUNNING_MEAN = 100
+"""Episodes in the progress bar's mean."""
+
+FAILED = 2
+
+
+@dataclass(frozen=True)
+class How:
+    """How to train; nothing of this changes what is learned.
+
+    Attributes:
+        engine: Who runs the loop.
+        checkpoint_every: Seconds between two checkpoints.
+        workers: How many seeds at once; None: as many as there are cores.
+        video: Film the result.
+        tensorboard: Write TensorBoard events.
+    """
+
+    engine: Engine = "compiled"
+    checkpoint_every: float = CHECKPOINT_EVERY
+    workers: int | None = None
+    video: bool = True
+    tensorboard: bool = False
+
+
+@dataclass(frozen=True)
+class Where:
+    """What a run is called and where it goes.
+
+    Attributes:
+        preset: Name of the preset that the config began from.
+        run_dir: The folder; None: a new one in runs/.
+        overwrite: Replace the run that is there.
+    """
+
+    preset: str
+    run_dir: Path | None = None
+    overwrite: bool = False
+
+    def folder(self, name: str) -> Path:
+        """The run's folder."""
+        return self.run_dir or runs.free_folder(RUNS, f"{self.preset}-{name}")
+
+
+def run_train(config: TrainConfig, how: How, where: Where) -> int:
+    """Train, evaluate, film; print what came out. Returns the exit code.
+
+    Raises:
+        Interrupted: After Ctrl-C or SIGTERM, when what was learned is kept; says where.
+    """
+    cartpole = _prepare(config, how)
+    folder, preset = where.folder(f"{config.backend}-seed{config.seed}"), where.preset
+    if how.video:
+        check_writable(make_folder(VIDEOS))
+    signals = StopSignals()
+    with signals.caught(), runs.claimed_folder(folder, overwrite=where.overwrite):
+        training = Training(config, engine=how.engine, cartpole=cartpole)
+        print(
+            f"{preset} on {config.backend}: {config.episodes:,} episodes, seed {config.seed}",
+            flush=True,
+        )
+        runs.begin_run(folder, config, cartpole, preset=preset, video=how.video)
+        session = Session(folder, training, cartpole, every=how.checkpoint_every)
+        _conduct(session, folder, cartpole, preset, how, signals)
+    return 0
+
+
+def run_resume(path: Path, how: How) -> int:
+    """Continue a training, or that of many seeds, as if it had not been interrupted.
+
+    Raises:
+        Interrupted: Again; see `run_train`.
+    """
+    silence_mujoco()
+    _check(how)
+    if (path / seed_runs.SEEDS).is_file():
+        return _resume_seeds(path, how)
+    folder = runs.run_folder(path)
+    if runs.is_complete(folder):
+        print(f"{folder} is complete: nothing is left to do")
+        return 0
+    signals = StopSignals()
+    with signals.caught(), runs.resumed_folder(path) as begun:
+        config, how = begun.config, dataclasses.replace(how, video=how.video and begun.video)
+        training = Training(config, engine=how.engine, cartpole=begun.cartpole)
+        session = Session(folder, training, begun.cartpole, every=how.checkpoint_every)
+        session.resume(begun.checkpoint)
+        print(
+            f"{begun.preset} on {config.backend}: goes on after {len(training.log):,} of "
+            f"{config.episodes:,} episodes, seed {config.seed}",
+            flush=True,
+        )
+        _conduct(session, folder, begun.cartpole, begun.preset, how, signals)
+    return 0
+
+
+def run_seeds(config: TrainConfig, how: How, where: Where, *, seeds: int) -> int:
+    """Train many seeds side by side, and print statistics over them. Returns the exit code.
+
+    Raises:
+        Interrupted: After Ctrl-C or SIGTERM, when what was learned is kept; says where.
+    """
+    cartpole = _prepare(config, how)
+    folder = where.folder(f"{config.backend}-seeds{config.seed}-{config.seed + seeds - 1}")
+    preset = where.preset
+    crew = _crew(config, seeds, cartpole, folder, preset, how)
+    signals = StopSignals()
+    with signals.caught(), seed_runs.claimed_seeds(folder, overwrite=where.overwrite):
+        seed_runs.begin_seeds(folder, config, crew.seeds, cartpole, preset=preset)
+        return _conduct_seeds(crew, config, folder, preset, signals)
+
+
+def _resume_seeds(folder: Path, how: How) -> int:
+    signals = StopSignals()
+    with signals.caught(), seed_runs.resumed_seeds(folder) as begun:
+        crew = _crew(begun.config, begun.seeds, begun.cartpole, folder, begun.preset, how)
+        return _conduct_seeds(crew, begun.config, folder, begun.preset, signals)
+
+
+def _prepare(config: TrainConfig, how: How) -> CartPole:
+    """Check all that can be checked before a folder is touched; returns the model."""
+    silence_mujoco()
+    _check(how)
+    cartpole = load_model(config.model)
+    runs.check_storable(cartpole)
+    return cartpole
+
+
+def _check(how: How) -> None:
+    check_interval(how.checkpoint_every)
+    if how.tensorboard:
+        tensorboard.check_installed()
+
+
+def _conduct(
+    session: Session,
+    folder: Path,
+    cartpole: CartPole,
+    preset: str,
+    how: How,
+    signals: StopSignals,
+) -> None:
+    """Train to the end or to a signal; write, print, evaluate and film."""
+    config = session.training.config
+    try:
+        with signals.deferred():
+            _train_with_progress(session, signals)
+            result, summary, greedy = conclude(
+                session, folder, cartpole, preset=preset, events=how.tensorboard
+            )
+        _print_learning(result)
+        if signals.stop() or greedy is None:
+            raise Interrupted(number=signals.number)
+        print_evaluation(greedy)
+        print(f"\nrun    {folder}", flush=True)
+        if how.video:
+            _film_result(result, cartpole, folder, summary)
+        runs.finish_run(folder)
+    except Interrupted as interrupted:
+        raise Interrupted(
+            f"interrupted after {len(session.training.log):,} of {config.episodes:,} episodes"
+            + _kept(folder),
+            signals.number,
+        ) from interrupted
+
+
+def _kept(folder: Path) -> str:
+    if not (folder / LATEST).exists():
+        return ", before anything was saved"
+    return f"; what was learned is kept in {folder}; go on with: mjcartpole train --resume {folder}"
+
+
+def _film_result(
+    result: TrainResult, cartpole: CartPole, folder: Path, summary: dict[str, Any]
+) -> None:
+    config = result.config
+    stage = Stage(
+        name=folder.resolve().name,
+        policy=result.policy,
+        backend=config.backend,
+        model=cartpole if config.backend == "mujoco" else "cartpole",
+        integrator=config.integrator,
+        seed=evaluation.SEED,
+    )
+    path = VIDEOS / f"{stage.name}.mp4"
+    film(stage, path, camera="side", width=640, height=480)
+    summary["video"] = str(path)
+    runs.write_summary(folder, summary)
+
+
+def _train_with_progress(session: Session, signals: StopSignals) -> None:
+    columns = (
+        TextColumn("training"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("episodes, mean return {task.fields[mean]:5.1f}"),
+        TimeRemainingColumn(),
+    )
+    training = session.training
+    with _progress(*columns) as progress:
+        done = len(training.log)
+        bar = progress.add_task("", total=training.config.episodes, completed=done, mean=0.0)
+        for finished in session.run(signals.stop):
+            recent = training.log.storage.totals[max(0, finished - RUNNING_MEAN) : finished]
+            progress.update(bar, completed=finished, mean=recent.mean())
+
+
+def _crew(
+    config: TrainConfig,
+    seeds: int | tuple[int, ...],
+    cartpole: CartPole,
+    folder: Path,
+    preset: str,
+    how: How,
+) -> Crew:
+    return Crew(
+        config,
+        seeds,
+        cartpole,
+        workers=how.workers,
+        engine=how.engine,
+        folder=folder,
+        preset=preset,
+        every=how.checkpoint_every,
+        events=how.tensorboard,
+    )
+
+
+def _conduct_seeds(
+    crew: Crew, config: TrainConfig, folder: Path, preset: str, signals: StopSignals
+) -> int:
+    """Train all seeds or to a signal; write and print."""
+    print(
+        f"{preset} on {config.backend}: {len(crew.seeds)} seeds from {crew.seeds[0]}, "
+        f"{config.episodes:,} episodes each, {crew.workers} at once\n",
+        flush=True,
+    )
+    columns = (TextColumn("training"), BarColumn(), MofNCompleteColumn(), TextColumn("seeds"))
+    with _progress(*columns) as progress, signals.deferred():
+        bar = progress.add_task("", total=len(crew.seeds))
+        for found in crew.run(signals.stop):
+            progress.update(bar, advance=0 if found is None else 1)
+    many = crew.result()
+    seed_runs.write_seeds(folder, many)
+    _print_seeds(many)
+    print(f"\nruns   {folder}", flush=True)
+    if signals.stop():
+        done = len(many.scores)
+        raise Interrupted(
+            f"interrupted with {done} of {len(crew.seeds)} seeds done; what was learned is kept in "
+            f"{folder}; go on with: mjcartpole train --resume {folder}",
+            signals.number,
+        )
+    for found in many.failed:
+        print(f"mjcartpole: error: seed {found.seed} failed: {found.error}", file=sys.stderr)
+    return FAILED if many.failed else 0
+
+
+def _print_learning(result: TrainResult) -> None:
+    """The article's table: mean return of each `log_every` episodes."""
+    returns, every = result.returns, result.config.log_every
+    print("\n episode   mean return")
+    for start in range(0, len(returns), every):
+        block = returns[start : start + every]
+        print(f"{start + len(block):8,} {block.mean():13.1f}")
+    rate = result.steps / result.seconds if result.seconds else 0.0
+    print(f"\n{result.steps:,} steps in {result.seconds:.1f} s ({rate:,.0f} per second)")
+
+
+def _print_seeds(many: ManyResult) -> None:
+    """A line per seed, and the statistics over them."""
+    print("   seed   greedy mean   minimum")
+    for found in many.seeds:
+        if found.evaluation is not None:
+            mean, minimum = found.evaluation["mean"], found.evaluation["minimum"]
+            print(f"{found.seed:7d} {mean:13.2f} {minimum:9.0f}")
+        else:
+            print(f"{found.seed:7d} {'failed' if found.error else 'stopped':>13s}")
+    aggregate = many.aggregate()
+    if aggregate is None:
+        return
+    low, high = aggregate.interval
+    print(
+        f"\nmean {aggregate.mean:.2f}, minimum {aggregate.minimum:.2f}\n"
+        f"interquartile mean {aggregate.iqm:.2f} "
+        f"({CONFIDENCE:.0%} interval {low:.2f} to {high:.2f})\n"
+        f"solved (at least {aggregate.solved_at:g}): {aggregate.solved:.0%}"
+    )
+
+
+def _progress(*columns: ProgressColumn) -> Progress:
+    console = Console(stderr=True)
+    return Progress(*columns, console=console, transient=True, disable=not console.is_terminal)

@@ -1,0 +1,478 @@
+"""The vector of environments, against single ones and against gymnasium's own vector."""
+
+import doctest
+import os
+import subprocess
+import sys
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.vector import AutoresetMode, SyncVectorEnv
+from gymnasium.wrappers.vector import RecordEpisodeStatistics
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mjcartpole import task
+from mjcartpole.envs import vector
+from mjcartpole.envs.cartpole import CartPoleEnv
+from mjcartpole.envs.vector import CartPoleVectorEnv
+from mjcartpole.errors import (
+    ConfigError,
+    InvalidActionError,
+    ModelNotFoundError,
+    RenderError,
+    ResetNeededError,
+    SimulationError,
+)
+from mjcartpole.physics.model import load_model
+
+ENV_ID = "mjcartpole/CartPole-v1"
+REFERENCE = load_model("cartpole").xml
+
+
+def edited(*changes):
+    """The reference document with words replaced."""
+    text = REFERENCE
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    return load_model(text)
+
+
+TOUCHING = (
+    ('contype="0" conaffinity="0"', 'contype="1" conaffinity="1"'),
+    # Cart and rail do not overlap, the cart and its stops do at 2.33 m.
+    ('pos="0 0.11 -0.14" size="2.68 0.05 0.04"', 'pos="0 0.11 -0.34" size="2.68 0.05 0.04"'),
+    ("2.63 0.11 -0.03", "2.56 0.11 -0.03"),
+)
+RUBBING = ('damping="0" frictionloss="0"', 'damping="0.1" frictionloss="0.05"')
+LIMITED = ('type="slide"', 'type="slide" range="-0.02 0.03"')
+MODELS = {
+    "reference": load_model("cartpole"),
+    "half steps": edited(('timestep="0.02"', 'timestep="0.01"')),
+    "rubbing, quarter steps": edited(RUBBING, ('timestep="0.02"', 'timestep="0.005"')),
+    "limited, half steps": edited(LIMITED, ('timestep="0.02"', 'timestep="0.01"')),
+    "touching": edited(*TOUCHING, ('timestep="0.02"', 'timestep="0.005"')),
+    "all at once": edited(*TOUCHING, RUBBING, LIMITED, ('timestep="0.02"', 'timestep="0.01"')),
+    "RK4": edited(('integrator="Euler"', 'integrator="RK4"')),
+    "implicit": edited(RUBBING, ('integrator="Euler"', 'integrator="implicitfast"')),
+    "sleeping": edited(
+        ('integrator="Euler"/>', 'integrator="Euler"><flag sleep="enable"/></option>')
+    ),
+}
+
+
+def run(envs, steps, seed=0):
+    """What a vector returns under actions that depend on the seed alone."""
+    generator = np.random.default_rng(seed)
+    results = [(envs.reset(seed=seed)[0],)]
+    for _ in range(steps):
+        results.append(envs.step(generator.integers(0, 2, envs.num_envs))[:4])
+    return results
+
+
+def test_the_specification_in_the_docstring_holds():
+    assert doctest.testmod(vector).failed == 0
+    assert doctest.testmod(vector).attempted > 5
+
+
+def test_make_vec_gives_it():
+    envs = gymnasium.make_vec(ENV_ID, num_envs=3)
+    reference = gymnasium.make_vec("CartPole-v1", num_envs=3)
+    assert isinstance(envs, CartPoleVectorEnv)
+    for name in ("num_envs", "max_episode_steps", "metadata"):
+        assert getattr(envs, name) == getattr(reference, name)
+    for name in ("action_space", "observation_space"):
+        assert getattr(envs, name) == getattr(reference, name)
+        assert getattr(envs, f"single_{name}") == getattr(reference, f"single_{name}")
+    assert envs.metadata["autoreset_mode"] is AutoresetMode.NEXT_STEP
+    assert gymnasium.make_vec(ENV_ID, num_envs=2, max_episode_steps=7).max_episode_steps == 7
+
+
+def test_single_environments_can_still_be_put_together():
+    envs = gymnasium.make_vec(ENV_ID, num_envs=2, vectorization_mode="sync")
+    assert isinstance(envs, SyncVectorEnv)
+    assert len(run(envs, 30)) == 31
+    envs.close()
+
+
+@pytest.mark.parametrize("integrator", ["gym", "mujoco"])
+@pytest.mark.parametrize("name", MODELS)
+@settings(max_examples=6, deadline=None)
+@given(
+    seed=st.integers(0, 2**31),
+    threads=st.sampled_from([1, 2, None]),
+    far=st.booleans(),
+    limit=st.integers(3, 40),
+)
+def test_each_environment_is_a_single_one_bit_for_bit(name, integrator, seed, threads, far, limit):
+    n = 5
+    arguments = {"model": MODELS[name], "integrator": integrator}
+    envs = CartPoleVectorEnv(n, max_episode_steps=limit, threads=threads, **arguments)
+    singles = [CartPoleEnv(**arguments) for _ in range(n)]
+    generator = np.random.default_rng(seed)
+    envs.reset(seed=seed)
+    if far:
+        # Where the stops are, and quick enough to reach them.
+        envs.state = generator.uniform((2.1, 1, -0.1, -1), (2.3, 3, 0.1, 1), (n, 4))
+    ages, restarting = np.zeros(n, int), np.zeros(n, bool)
+    for single, state in zip(singles, envs.state, strict=True):
+        single.state = state
+    for _ in range(60):
+        actions = generator.integers(0, 2, n)
+        observations, rewards, terminations, truncations, _ = envs.step(actions)
+        for i, single in enumerate(singles):
+            if restarting[i]:
+                single.reset()
+                single.state = envs.state[i]
+                ages[i] = 0
+                assert (rewards[i], terminations[i], truncations[i]) == (0.0, False, False)
+                continue
+            observation, reward, terminated, _, _ = single.step(int(actions[i]))
+            ages[i] += 1
+            assert envs.state[i].tobytes() == single.state.tobytes()
+            assert observations[i].tobytes() == observation.tobytes()
+            assert (rewards[i], terminations[i]) == (reward, terminated)
+            assert truncations[i] == (ages[i] >= limit)
+        restarting = terminations | truncations
+
+
+def test_the_models_of_the_comparison_do_what_their_names_say():
+    """Else they would compare nothing."""
+
+    def after(name, state):
+        env = CartPoleEnv(model=MODELS[name])
+        env.state = state
+        for _ in range(3):
+            env.step(1)
+        return env.state
+
+    quick = (2.3, 2.0, 0.0, 0.0)
+    assert after("touching", quick)[0] < after("half steps", quick)[0] - 0.01
+    still = (0.0, 1.0, 0.0, 0.0)
+    assert after("limited, half steps", still)[1] < after("half steps", still)[1] - 0.1
+    assert after("rubbing, quarter steps", still)[1] < after("half steps", still)[1] - 0.001
+    assert CartPoleVectorEnv(model=MODELS["sleeping"])._batch.persistent
+
+
+@pytest.mark.parametrize("integrator", ["gym", "mujoco"])
+@pytest.mark.parametrize("name", ["reference", "all at once"])
+def test_threads_change_no_bit(name, integrator):
+    results = []
+    for threads in (1, 2, 3, None):
+        envs = CartPoleVectorEnv(
+            65, max_episode_steps=25, threads=threads, model=MODELS[name], integrator=integrator
+        )
+        run(envs, 60)
+        results.append(envs.state.tobytes())
+    assert len(set(results)) == 1
+
+
+@pytest.mark.parametrize("sutton_barto", [False, True])
+@pytest.mark.parametrize(
+    ("integrator", "kinematics"), [("gym", "euler"), ("mujoco", "semi-implicit")]
+)
+@given(seed=st.integers(0, 2**31), n=st.integers(1, 12))
+@settings(max_examples=8, deadline=None)
+def test_equal_to_gymnasiums_vector(sutton_barto, integrator, kinematics, seed, n):
+    arguments = {"num_envs": n, "max_episode_steps": 30, "sutton_barto_reward": sutton_barto}
+    envs = gymnasium.make_vec(ENV_ID, integrator=integrator, **arguments)
+    reference = gymnasium.make_vec("CartPole-v1", **arguments)
+    reference.unwrapped.kinematics_integrator = kinematics
+    ours, theirs = run(envs, 100, seed), run(reference, 100, seed)
+    np.testing.assert_array_equal(ours[0][0], theirs[0][0])
+    endings = 0
+    for mine, its in zip(ours[1:], theirs[1:], strict=True):
+        np.testing.assert_allclose(mine[0], its[0], rtol=0, atol=1e-6)
+        for a, b in zip(mine[1:], its[1:], strict=True):
+            np.testing.assert_array_equal(a, b)
+        assert [array.dtype for array in mine] == [array.dtype for array in its]
+        assert [array.shape for array in mine] == [array.shape for array in its]
+        endings += mine[2].sum() + mine[3].sum()
+    assert endings >= 3 * n
+    np.testing.assert_allclose(envs.state, reference.unwrapped.state.T, rtol=0, atol=1e-12)
+
+
+def test_a_restart_takes_gymnasiums_draws_and_ignores_the_action():
+    envs = gymnasium.make_vec(ENV_ID, num_envs=3, max_episode_steps=5)
+    reference = gymnasium.make_vec("CartPole-v1", num_envs=3, max_episode_steps=5)
+    for each in (envs, reference):
+        each.reset(seed=11)
+        for _ in range(5):
+            *_, truncations, _ = each.step(np.ones(3, dtype=int))
+        assert truncations.all()
+        each.step(np.zeros(3, dtype=int))
+    np.testing.assert_array_equal(envs.state, reference.unwrapped.state.T)
+
+
+@pytest.mark.parametrize("steps", [3, 5])
+def test_a_reset_in_the_middle_or_at_the_end_starts_all_anew(steps):
+    envs = CartPoleVectorEnv(3, max_episode_steps=5)
+    envs.reset(seed=1)
+    for _ in range(steps):
+        envs.step([0, 1, 0])
+    envs.reset()
+    flags = [envs.step([0, 1, 0])[1:4] for _ in range(5)]
+    assert [rewards.tolist() for rewards, *_ in flags] == [[1.0] * 3] * 5
+    assert [truncations.all() for *_, truncations in flags] == [False] * 4 + [True]
+
+
+def test_bounds_of_the_start_hold_until_the_next_reset():
+    options = {"low": 0.01, "high": 0.02}
+    envs = gymnasium.make_vec(ENV_ID, num_envs=8, max_episode_steps=2)
+    reference = gymnasium.make_vec("CartPole-v1", num_envs=8, max_episode_steps=2)
+    for each in (envs, reference):
+        first, _ = each.reset(seed=3, options=options)
+        for _ in range(3):
+            again, *_ = each.step(np.ones(8, dtype=int))
+        for observations in (first, again):
+            assert observations.min() >= 0.01
+            assert observations.max() <= 0.02
+    np.testing.assert_array_equal(again, envs.state.astype(np.float32))
+    assert envs.reset(seed=3)[0].min() < 0
+
+
+@pytest.mark.parametrize("options", [{"low": 1.0, "high": 0.0}, {"low": "x"}, {"high": None}])
+def test_bounds_that_make_no_sense(options):
+    with pytest.raises(ValueError, match=r"Lower bound|could not be converted"):
+        CartPoleVectorEnv(2).reset(options=options)
+
+
+def test_a_start_beyond_the_limits_ends_with_the_step_after_it():
+    envs = CartPoleVectorEnv(2, max_episode_steps=1)
+    envs.reset(seed=0, options={"low": 1.0, "high": 1.1})
+    flags = [envs.step(np.zeros(2, dtype=int))[1:4] for _ in range(3)]
+    assert [terminations.all() for _, terminations, _ in flags] == [True, False, True]
+    assert [rewards.tolist() for rewards, *_ in flags] == [[1, 1], [0, 0], [1, 1]]
+
+
+@pytest.mark.parametrize("place", [0, 2])
+@pytest.mark.parametrize("sign", [-1, 1])
+def test_limits_are_strict(place, sign):
+    envs = CartPoleVectorEnv(2)
+    limit = (task.X_LIMIT, 0, task.THETA_LIMIT)[place]
+    states = np.zeros((2, 4))
+    states[:, place] = sign * limit, sign * np.nextafter(limit, np.inf)
+    envs.state = states
+    assert envs.step([0, 1])[2].tolist() == [False, True]
+
+
+def test_what_was_returned_is_never_written_again():
+    envs = CartPoleVectorEnv(16, max_episode_steps=9)
+    results, copies = [], []
+    envs.reset(seed=0)
+    for _ in range(40):
+        results.append((*envs.step(np.ones(16, dtype=int))[:4], envs.state))
+        copies.append([array.copy() for array in results[-1]])
+    for result, copied in zip(results, copies, strict=True):
+        for array, before in zip(result, copied, strict=True):
+            np.testing.assert_array_equal(array, before)
+
+
+def test_what_was_returned_may_be_written():
+    envs, untouched = (
+        CartPoleVectorEnv(4, max_episode_steps=3),
+        CartPoleVectorEnv(4, max_episode_steps=3),
+    )
+    for each in (envs, untouched):
+        each.reset(seed=0)
+    for _ in range(10):
+        results = envs.step(np.ones(4, dtype=int))
+        expected = untouched.step(np.ones(4, dtype=int))
+        for array, other in zip(results[:4], expected[:4], strict=True):
+            np.testing.assert_array_equal(array, other)
+            array[...] = 1
+        envs.state[...] = 7
+
+
+def test_observations_are_contiguous():
+    envs = CartPoleVectorEnv(4)
+    assert envs.reset(seed=0)[0].flags.c_contiguous
+    assert envs.step([0, 1, 0, 1])[0].flags.c_contiguous
+
+
+GOOD_ACTIONS = [
+    np.array([0, 1]),
+    np.array([0, 1], dtype=np.int8),
+    np.array([0, 1], dtype=np.int32),
+    np.array([0, 1], dtype=np.uint32),
+    np.array([False, True]),
+    np.array([[0, 5], [1, 5]])[:, 0],
+    [0, 1],
+    (0, True),
+]
+BAD_ACTIONS = [
+    np.array([0, 2]),
+    np.array([-1, 1]),
+    np.array([1, -1]),
+    np.array([2, 3]),
+    np.array([-2, 3]),
+    np.array([0, 2**40]),
+    np.array([0, 1], dtype=np.uint64),
+    np.array([0.0, 1.0]),
+    np.array([[0, 1]]),
+    np.array([0]),
+    np.array([0, 1, 0]),
+    np.array(["0", "1"]),
+    [0, 2],
+    [0.0, 1.0],
+    [0],
+    1,
+    None,
+]
+
+
+@pytest.mark.parametrize("actions", GOOD_ACTIONS, ids=repr)
+def test_actions_that_the_space_contains(actions):
+    envs = CartPoleVectorEnv(2)
+    envs.state = np.zeros((2, 4))
+    assert envs.action_space.contains(actions)
+    envs.step(actions)
+    assert np.sign(envs.state[:, 1]).tolist() == [-1, 1]
+
+
+@pytest.mark.parametrize("actions", BAD_ACTIONS, ids=repr)
+def test_actions_that_the_space_does_not_contain(actions):
+    envs = CartPoleVectorEnv(2)
+    envs.reset(seed=0)
+    before = envs.state
+    assert not envs.action_space.contains(actions)
+    with pytest.raises(InvalidActionError, match="2 integers, each 0 or 1"):
+        envs.step(actions)
+    np.testing.assert_array_equal(envs.state, before)
+
+
+def test_a_step_needs_a_reset():
+    envs = CartPoleVectorEnv(2)
+    assert envs.state is None
+    with pytest.raises(ResetNeededError, match="Call reset before"):
+        envs.step(np.array([0, 1]))
+
+
+def test_the_state_is_read_and_set():
+    envs = CartPoleVectorEnv(2)
+    values = np.array([[0.1, 0.2, 0.03, 0.4], [-0.1, 0.0, 0.01, 0.3]])
+    envs.state = values
+    values[0] = 9.0
+    envs.state[1] = 9.0
+    assert envs.state.dtype == np.float64
+    assert envs.state.tolist() == [[0.1, 0.2, 0.03, 0.4], [-0.1, 0.0, 0.01, 0.3]]
+    with pytest.raises(ConfigError, match=r"states have the shape \(2, 4\)"):
+        envs.state = np.zeros((4, 2))
+
+
+def test_a_state_set_between_steps_leaves_the_episodes_as_they_are():
+    envs = CartPoleVectorEnv(2, max_episode_steps=2)
+    envs.reset(seed=0)
+    envs.step([0, 1])
+    envs.state = np.zeros((2, 4))
+    assert envs.step([0, 1])[3].all()
+    envs.state = np.full((2, 4), np.nan)
+    # They restart, so what they were in does not matter.
+    assert envs.step([0, 1])[1].tolist() == [0.0, 0.0]
+    assert np.abs(envs.state).max() <= 0.05
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, 1e11])
+@pytest.mark.parametrize("place", range(4))
+def test_an_environment_that_diverged_is_named(bad, place):
+    envs = CartPoleVectorEnv(3)
+    states = np.zeros((3, 4))
+    states[1, place] = bad
+    envs.state = states
+    with pytest.raises(SimulationError, match=r"cartpole \(environment 1 of 3\) diverged"):
+        envs.step([0, 1, 0])
+    envs.reset(seed=0)
+    assert np.isfinite(envs.step([0, 1, 0])[0]).all()
+
+
+@pytest.mark.parametrize("integrator", ["gym", "mujoco"])
+def test_a_diverging_model_is_an_error_on_any_thread(integrator):
+    massless = REFERENCE.replace('mass="1.0"', 'mass="1e-12"').replace('gear="10"', 'gear="1e14"')
+    envs = CartPoleVectorEnv(64, model=massless, integrator=integrator, threads=4)
+    envs.reset(seed=0)
+    with pytest.raises(SimulationError, match=r"environment 0 of 64"):
+        for _ in range(3):
+            envs.step(np.ones(64, dtype=int))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "message"),
+    [
+        ({"model": "nothing"}, ModelNotFoundError, "no model is called 'nothing'"),
+        ({"integrator": "rk4"}, ConfigError, "available: gym, mujoco"),
+        ({"render_mode": "human"}, ConfigError, "available: None, 'rgb_array'"),
+        ({"num_envs": 0}, ConfigError, "num_envs 0 makes no sense"),
+        ({"num_envs": 2.0}, ConfigError, "num_envs 2.0 makes no sense"),
+        ({"max_episode_steps": 0}, ConfigError, "max_episode_steps 0 makes no sense"),
+        ({"threads": 0}, ConfigError, "threads 0 makes no sense; it is a whole number from 1"),
+        ({"threads": -1}, ConfigError, "threads -1"),
+        ({"threads": "all"}, ConfigError, "threads 'all'"),
+        ({"camera": "moon"}, RenderError, r"moon.*side"),
+        ({"width": 0}, RenderError, "no size of a picture"),
+        ({"colour": "red"}, TypeError, "colour"),
+    ],
+)
+def test_arguments_that_make_no_sense(arguments, error, message):
+    with pytest.raises(error, match=message):
+        CartPoleVectorEnv(**arguments)
+
+
+def test_one_environment_is_a_vector_too():
+    envs = gymnasium.make_vec(ENV_ID)
+    observations, _ = envs.reset(seed=0)
+    assert observations.shape == (1, 4)
+    observations, rewards, *_ = envs.step(envs.action_space.sample())
+    assert (observations.shape, rewards.shape) == ((1, 4), (1,))
+
+
+@pytest.mark.parametrize("n", [1, 7])
+def test_gymnasiums_statistics_count_the_same(n):
+    found = []
+    for name in (ENV_ID, "CartPole-v1"):
+        envs = RecordEpisodeStatistics(gymnasium.make_vec(name, num_envs=n, max_episode_steps=20))
+        run(envs, 120)
+        found.append((list(envs.return_queue), list(envs.length_queue)))
+    assert len(found[0][0]) >= 5 * n
+    assert found[0] == found[1]
+
+
+def test_one_picture_per_environment():
+    envs = gymnasium.make_vec(ENV_ID, num_envs=2, render_mode="rgb_array", width=160, height=120)
+    assert envs.render() is None
+    envs.reset(seed=0)
+    envs.unwrapped.state = [(0.0, 0.0, 0.0, 0.0), (1.0, 0.0, 0.1, 0.0)]
+    left, right = envs.render()
+    single = CartPoleEnv(render_mode="rgb_array", width=160, height=120)
+    single.state = (1.0, 0.0, 0.1, 0.0)
+    assert left.shape == (120, 160, 3)
+    assert np.abs(left.astype(int) - right).max() > 50
+    np.testing.assert_array_equal(right, single.render())
+    for each in (envs, envs, single):
+        each.close()
+
+
+def test_rendering_without_a_mode_warns():
+    envs = CartPoleVectorEnv(2)
+    envs.reset(seed=0)
+    with pytest.warns(UserWarning, match="without specifying any render mode"):
+        assert envs.render() is None
+    envs.close()
+
+
+def test_no_opengl_is_needed_whatever_the_environment_asks_for():
+    code = (
+        "import gymnasium, mjcartpole\n"
+        f"envs = gymnasium.make_vec('{ENV_ID}', num_envs=2)\n"
+        "envs.reset(seed=0)\n"
+        "print(envs.step([0, 1])[1].tolist())"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        env={**os.environ, "MUJOCO_GL": "nonsense"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.stdout, done.stderr) == ("[1.0, 1.0]\n", "")
