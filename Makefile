@@ -4,13 +4,14 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN = $(VENV)/bin
 
-.PHONY: help train test test-all lint clean
+.PHONY: help train test test-all lint bench clean
 .DELETE_ON_ERROR:
 
 help:
 	@echo "make train     train a Q-table on MuJoCo, evaluate it, film it (ARGS=... for flags)"
 	@echo "make test      lint, types and the fast tests"
 	@echo "make test-all  the same with the slow tests"
+	@echo "make bench     how fast it is, as ratios to gymnasium and MuJoCo alone"
 	@echo "make clean     remove the virtual environment and caches; runs and videos stay"
 
 train: $(VENV)/installed
@@ -21,6 +22,9 @@ test: lint
 
 test-all: lint
 	$(BIN)/python -m pytest -q
+
+bench: $(VENV)/installed-dev
+	$(BIN)/python -m benchmarks.bench $(ARGS)
 
 lint: $(VENV)/installed-dev
 	$(BIN)/ruff check .

@@ -30,7 +30,7 @@ TOP = {
     "__main__",
     "__init__",
 }
-MUJOCO_HOMES = ("physics/", "media/", "envs/vector.py", "learning/kernels.py")
+MUJOCO_HOMES = ("physics/", "media/", "envs/vector.py")
 
 SOURCES = sorted(PACKAGE.rglob("*.py"))
 

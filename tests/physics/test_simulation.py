@@ -74,6 +74,39 @@ def test_a_step_depends_on_the_state_alone():
     assert fresh.step(-1.0) == used.step(-1.0)
 
 
+def test_plain_floats_put_a_state_as_the_setter_does():
+    state = (0.1, -0.2, 0.05, 0.3)
+    set_, put = Simulation(CARTPOLE), Simulation(CARTPOLE)
+    set_.state = state
+    put.put(*state)
+    np.testing.assert_array_equal(put.state, state)
+    assert put.step(1.0) == set_.step(1.0)
+
+
+def test_nothing_of_the_past_remains_in_a_new_state():
+    simulation, data = Simulation(CARTPOLE), Simulation(CARTPOLE).data
+    simulation.data.qfrc_applied[:], simulation.data.xfrc_applied[:] = 5.0, 5.0
+    simulation.state = (np.nan, 0.0, 0.0, 0.0)
+    for _ in range(20):
+        simulation.step(1.0)
+    simulation.state = np.zeros(4)
+    for name in ("time", "ctrl", "qfrc_applied", "xfrc_applied", "qacc", "qacc_warmstart"):
+        np.testing.assert_array_equal(getattr(simulation.data, name), getattr(data, name))
+    assert not any(warning.number for warning in simulation.data.warning)
+
+
+def test_mujocos_timers_count_since_the_state_was_set():
+    simulation = Simulation(CARTPOLE)
+    timer = simulation.data.timer[int(mujoco.mjtTimer.mjTIMER_STEP)]
+    simulation.step(1.0)
+    simulation.state = np.zeros(4)
+    assert (timer.number, timer.duration) == (0, 0.0)
+    for _ in range(3):
+        simulation.step(1.0)
+    assert timer.number == 3
+    assert timer.duration > 0
+
+
 def variant(pattern, replacement):
     text, count = re.subn(pattern, replacement, CARTPOLE.xml, count=1)
     assert count == 1

@@ -203,10 +203,11 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int]):
         kind = type(action)
         if kind is not int and kind is not _INT64 and not self.action_space.contains(action):
             raise _invalid(action)
-        if action == 1:
-            control = self._right
-        elif action == 0:
+        # A numpy integer tells whether it is zero much sooner than whether it equals one.
+        if not action:
             control = self._left
+        elif action == 1:
+            control = self._right
         else:
             raise _invalid(action)
         advance = self._advance

@@ -18,6 +18,7 @@ from mjcartpole.learning.loop import in_episode
 from mjcartpole.learning.policy import Policy
 from mjcartpole.learning.qlearning import TabularQ
 from mjcartpole.physics.cartpole_v1 import FORCE
+from mjcartpole.physics.library import libmujoco
 from mjcartpole.physics.model import ModelLike, load_model
 from mjcartpole.physics.simulation import Simulation, check_sane
 
@@ -33,7 +34,7 @@ def unavailable(backend: Backend) -> str:
     """Why the compiled engine cannot run here; empty if it can."""
     if config.DISABLE_JIT:  # type: ignore[attr-defined]
         return "NUMBA_DISABLE_JIT is set"
-    return kernels.link(kernels.libmujoco()) if backend == "mujoco" else ""
+    return kernels.link(libmujoco()) if backend == "mujoco" else ""
 
 
 class CompiledLoop:

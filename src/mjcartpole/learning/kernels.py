@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple, TypeAlias, TypeVar, cast
 
 import llvmlite.binding
-import mujoco
 import numba
 import numpy as np
 import numpy.typing as npt
@@ -100,15 +99,6 @@ class Scratch(NamedTuple):
     rewards: Floats
     failure: Floats
     """Steps before a simulation diverged, and its state then, shape (5,)."""
-
-
-def libmujoco() -> Path | None:
-    """The library that the mujoco package brings along, if it is where it is expected."""
-    folder = Path(mujoco.__file__).parent
-    for pattern in ("libmujoco.so*", "libmujoco*.dylib", "mujoco.dll"):
-        for path in sorted(folder.glob(pattern)):
-            return path
-    return None
 
 
 def link(library: Path | None) -> str:
