@@ -29,8 +29,8 @@ def train_like_the_article(episodes: int) -> int:
             done, following = terminated or truncated, discrete(observation)
             if not done:
                 future = np.max(table[following])
-                current = table[(*state, action)]
-                table[(*state, action)] = 0.9 * current + 0.1 * (float(reward) + 0.95 * future)
+                cell: tuple[int, ...] = (*state, int(action))
+                table[cell] = 0.9 * table[cell] + 0.1 * (float(reward) + 0.95 * future)
             state = following
             steps += 1
         if 1 <= episode <= episodes // 2:

@@ -6,12 +6,16 @@ from typing import Any
 import gymnasium
 import mujoco
 import numpy as np
-from dm_control import mujoco as dm_mujoco
-from dm_control.rl import control
 from gymnasium.envs.mujoco import MujocoEnv
 
 from mjcartpole import task
 from mjcartpole.physics.model import find_model, load_model
+
+with warnings.catch_warnings():
+    # dm_control opens a window library, which complains where there is no screen.
+    warnings.simplefilter("ignore")
+    from dm_control import mujoco as dm_mujoco
+    from dm_control.rl import control
 
 
 class GymnasiumMujoco(MujocoEnv):
@@ -25,10 +29,7 @@ class GymnasiumMujoco(MujocoEnv):
     def __init__(self) -> None:
         """Load the reference model."""
         space = gymnasium.spaces.Box(-np.inf, np.inf, (4,), np.float64)
-        with warnings.catch_warnings():
-            # It imports a window library, which complains where there is no screen.
-            warnings.simplefilter("ignore")
-            super().__init__(str(find_model("cartpole")), 1, space)
+        super().__init__(str(find_model("cartpole")), 1, space)
 
     def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:  # noqa: ANN401
         """Advance 0.02 s."""
