@@ -53,3 +53,6 @@ def test_reward(terminated, already_over, plain, sutton_barto):
     arguments = {"terminated": terminated, "already_over": already_over}
     assert task.reward(**arguments, sutton_barto=False) == plain
     assert task.reward(**arguments, sutton_barto=True) == sutton_barto
+    # Compiled code has no names for arguments.
+    assert task.reward(terminated, already_over, False) == plain
+    assert task.reward(terminated, already_over, True) == sutton_barto

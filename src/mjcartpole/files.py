@@ -27,9 +27,9 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
     temporary = _make_temporary(target)
     try:
         yield temporary
-        _sync(temporary)
+        sync(temporary)
         temporary.replace(target)
-        _sync(target.parent)
+        sync(target.parent)
     except OSError as error:
         raise FileError(f"cannot write '{target}': {_reason(error)}") from error
     finally:
@@ -93,8 +93,8 @@ def _make_temporary(target: Path) -> Path:
     return temporary
 
 
-def _sync(path: Path) -> None:
-    """Bring a file, or the entries of a folder, to the disk."""
+def sync(path: Path) -> None:
+    """Bring a file's content, or a folder's entries, to the disk."""
     if path.is_dir() and os.name == "nt":
         return  # Windows has no way to open a folder for this.
     handle = os.open(path, os.O_RDONLY if path.is_dir() else os.O_RDWR)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from mjcartpole.errors import ConfigError
 from mjcartpole.learning.config import TrainConfig
-from mjcartpole.learning.discretizer import Discretizer
+from mjcartpole.learning.discretizer import Discretizer, Grid, row_of
 
 TUNED = TrainConfig().discretizer
 anything = st.floats(allow_nan=False)
@@ -56,6 +56,33 @@ def test_rows_are_counted_as_in_a_c_ordered_array(bins, values):
 
 def test_one_bin_ignores_a_dimension():
     assert TUNED([-99.0, 0.1, 0.1, 0.1]) == TUNED([99.0, 0.1, 0.1, 0.1])
+
+
+def test_the_grid_holds_the_dimensions_that_are_used():
+    grid = Discretizer((1, 4, 1, 3), (-9.0, -1.0, -9.0, 0.0), (9.0, 1.0, 9.0, 6.0)).grid
+    assert grid == Grid((1, 3), (4, 3), (-1.0, 0.0), (1.0, 6.0), (0.5, 2.0))
+    assert row_of([99.0, 0.6, 99.0, 2.0], grid) == 3 * 3 + 1
+
+
+def test_without_any_bins_all_is_one_row():
+    discretizer = Discretizer((1, 1), (0.0, 0.0), (1.0, 1.0))
+    assert discretizer.grid == Grid((), (), (), (), ())
+    assert discretizer([math.inf, -5.0]) == 0
+
+
+def test_rounding_lifts_nothing_into_a_bin_that_is_not_there():
+    """The last value below the upper end, divided by the width, may round up to n."""
+    for n in range(2, 400):
+        for low, high in ((-0.2095, 0.2095), (-0.1, 0.3), (0.0, 1e-3), (-2.4, 2.4)):
+            discretizer = Discretizer((n,), (low,), (high,))
+            assert discretizer([math.nextafter(high, low)]) == n - 1
+            assert discretizer([low]) == 0
+
+
+def test_the_same_grid_is_an_equal_discretizer():
+    assert TrainConfig().discretizer == TUNED
+    assert hash(TrainConfig().discretizer) == hash(TUNED)
+    assert "grid" not in repr(TUNED)
 
 
 def test_the_articles_grid():

@@ -8,24 +8,11 @@ import pytest
 
 from mjcartpole import task
 from mjcartpole.envs.backend import make_env
+from mjcartpole.errors import SimulationError
 from mjcartpole.learning.config import PRESETS, TrainConfig
 from mjcartpole.learning.discretizer import Discretizer
-from mjcartpole.learning.loop import ending_of, learn_episodes, play_episode
+from mjcartpole.learning.loop import learn_episodes, play_episode
 from mjcartpole.learning.training import Training
-
-
-@pytest.mark.parametrize(
-    ("terminated", "x", "ending"),
-    [
-        (False, 2.4, "time limit"),
-        (True, 2.41, "off the track"),
-        (True, -2.41, "off the track"),
-        (True, 2.4, "pole fell"),
-        (True, 0.0, "pole fell"),
-    ],
-)
-def test_endings(terminated, x, ending):
-    assert ending_of(terminated, np.array([x, 0.0, 0.3, 0.0])) == ending
 
 
 def test_playing_records_every_state_from_first_to_last():
@@ -74,16 +61,18 @@ def articles_code(episodes, seed, *, terminal):
     return config, table, returns
 
 
+@pytest.mark.parametrize("engine", ["python", "compiled"])
 @pytest.mark.parametrize("preset", ["article", "article-terminal"])
-def test_the_article_presets_do_what_the_articles_code_does(preset):
+def test_the_article_presets_do_what_the_articles_code_does(preset, engine):
     terminal = preset == "article-terminal"
     config, table, returns = articles_code(150, seed=5, terminal=terminal)
     config = TrainConfig(
         **{**PRESETS[preset], "backend": "gym", "seed": 5, "episodes": config.episodes}
     )
-    training = Training(config)
-    ours = [episode.total for episode in training.run()]
-    assert ours == returns
+    training = Training(config, engine=engine)
+    for _ in training.run():
+        pass
+    assert [episode.total for episode in training.log] == returns
     # (1 - a) q + a t and q + a (t - q) round differently: equal to the last digits only.
     np.testing.assert_allclose(training.result().q_table[0, 0], table, rtol=1e-12)
 
@@ -95,8 +84,10 @@ class Recorder:
         self.learn_last_step = learn_last_step
         self.td_lambda = td_lambda
         self.taught = []
+        self.begun = []
 
     def begin_episode(self, episode):
+        self.begun.append(episode)
         self.taught.append([])
 
     def act(self, s):
@@ -140,14 +131,15 @@ def test_what_the_last_step_teaches(terminates, learn_last_step):
     learner = Recorder(learn_last_step)
     grid = Discretizer((4,), (0.0,), (4.0,))
     env = ThreeSteps(terminates)
-    episodes = list(learn_episodes(env, learner, grid, episodes=2, seed=0))
+    episodes = list(learn_episodes(env, learner, grid, range(5, 7)))
     steps = [(0, 1, 1.0, 1, False), (1, 1, 1.0, 2, False)]
     # Truncated is not terminated: the learner may bootstrap.
     last = [(2, 1, 1.0, 3, terminates)] if learn_last_step else []
     assert learner.taught == [steps + last] * 2
+    assert learner.begun == [5, 6], "the schedules see the numbers that were asked for"
     assert [(episode.number, episode.total, episode.steps) for episode in episodes] == [
-        (0, 3.0, 3),
-        (1, 3.0, 3),
+        (5, 3.0, 3),
+        (6, 3.0, 3),
     ]
 
 
@@ -156,8 +148,39 @@ def test_what_is_replayed_after_an_episode(terminates):
     grid = Discretizer((4,), (0.0,), (4.0,))
     whole, cut = Recorder(True, td_lambda=0.9), Recorder(False, td_lambda=0.9)
     for learner in (whole, cut):
-        episodes = list(learn_episodes(ThreeSteps(terminates), learner, grid, episodes=1, seed=0))
+        episodes = list(learn_episodes(ThreeSteps(terminates), learner, grid, range(1)))
         assert (episodes[0].total, episodes[0].steps) == (3.0, 3)
     assert whole.taught == [[([0, 1, 2, 3], [1, 1, 1], [1.0] * 3, terminates)]]
     # Without its last step an episode has an open end.
     assert cut.taught == [[([0, 1, 2], [1, 1], [1.0] * 2, False)]]
+
+
+class Diverging(ThreeSteps):
+    """Its physics diverge in the second step of the second episode."""
+
+    episodes = 0
+
+    def reset(self, *, seed=None, options=None):
+        self.episodes += 1
+        return super().reset(seed=seed)
+
+    def step(self, action):
+        if (self.episodes, self.count) == (2, 1):
+            raise SimulationError("the simulation diverged")
+        return super().step(action)
+
+
+@pytest.mark.parametrize("td_lambda", [None, 0.5])
+def test_diverging_physics_are_named_by_episode_and_step(td_lambda):
+    learner, grid = Recorder(True, td_lambda), Discretizer((4,), (0.0,), (4.0,))
+    episodes = learn_episodes(Diverging(True), learner, grid, range(1_300, 1_400))
+    assert next(episodes).number == 1_300
+    with pytest.raises(SimulationError, match=r"^episode 1,302, step 2: the simulation diverged$"):
+        next(episodes)
+
+
+def test_a_played_episode_names_its_number_where_physics_diverge():
+    env = Diverging(True)
+    play_episode(env, lambda observation: 1)
+    with pytest.raises(SimulationError, match=r"^episode 8, step 2: the simulation diverged$"):
+        play_episode(env, lambda observation: 1, number=7)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mjcartpole.learning.qlearning import TabularQ
+from mjcartpole.learning.qlearning import TabularQ, choose, learn_episode, learn_step
 from mjcartpole.learning.schedules import LinearSchedule
 
 
@@ -88,3 +88,66 @@ def test_lambda_0_is_one_step_learning_in_reverse_order():
     for t in (2, 1, 0):
         stepped.update(states[t], actions[t], rewards[t], states[t + 1], terminated=t == 2)
     np.testing.assert_allclose(replayed.q_table, stepped.q_table, rtol=1e-14)
+
+
+class Counting:
+    """Stands in for a generator: gives what it is told to, and counts."""
+
+    def __init__(self, *values):
+        self.values = list(values)
+
+    def random(self):
+        return self.values.pop(0)
+
+
+@pytest.mark.parametrize(
+    ("draws", "epsilon", "draw_ties", "action"),
+    [
+        ((0.5,), 0.5, True, 1),  # as large as epsilon is not below it
+        ((0.49, 0.49), 0.5, True, 0),
+        ((0.49, 0.5), 0.5, True, 1),
+        ((0.0,), 0.0, True, 1),
+    ],
+)
+def test_one_number_is_drawn_and_one_more_for_a_random_action(draws, epsilon, draw_ties, action):
+    rng = Counting(*draws)
+    assert choose([9.0, 9.0, 1.0, 2.0], 1, epsilon, draw_ties, rng) == action
+    assert rng.values == []
+
+
+@pytest.mark.parametrize(
+    ("draw_ties", "draws", "action"),
+    [(False, (0.9,), 0), (True, (0.9, 0.2), 0), (True, (0.9, 0.7), 1)],
+)
+def test_a_tie_is_drawn_where_that_is_asked_for(draw_ties, draws, action):
+    rng = Counting(*draws)
+    assert choose([0.0, 1.0, 3.0, 3.0], 1, 0.1, draw_ties, rng) == action
+    assert rng.values == []
+
+
+def test_the_table_is_changed_in_place():
+    table = np.array([[1.0, 2.0], [3.0, 4.0]])
+    q = learner(table)
+    assert q.q_table is not table, "the helper copies"
+    before = q.q_table
+    q.update(1, 0, 1.0, 0, terminated=True)
+    assert q.q_table is before
+    assert before[1, 0] == 2.0
+
+
+def test_the_functions_are_what_the_learner_does():
+    table = np.random.default_rng(1).normal(size=(3, 2))
+    q, flat = learner(table), table.reshape(-1).copy()
+    q.update(0, 1, 1.0, 2, terminated=False)
+    learn_step(flat, 0, 1, 1.0, 2, False, 0.5, 0.9)
+    assert q.q_table.tobytes() == flat.tobytes()
+    q = learner(flat.reshape(3, 2), lam=0.3)
+    q.replay([0, 1, 2], [1, 0], [1.0, 1.0], over=False)
+    learn_episode(flat, [0, 1, 2, 99], [1, 0, 99], [1.0, 1.0, 99.0], 2, False, 0.5, 0.9, 0.3)
+    assert q.q_table.tobytes() == flat.tobytes(), "what lies beyond its steps is not looked at"
+
+
+def test_an_episode_without_steps_teaches_nothing():
+    q = learner([[1.0, 2.0]], lam=0.9)
+    q.replay([0], [], [], over=False)
+    assert q.q_table.tolist() == [[1.0, 2.0]]

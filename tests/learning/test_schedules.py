@@ -2,7 +2,7 @@
 
 import pytest
 
-from mjcartpole.learning.schedules import LinearSchedule
+from mjcartpole.learning.schedules import LinearSchedule, on_line
 
 
 @pytest.mark.parametrize(
@@ -19,3 +19,17 @@ def test_no_slope_means_the_end_at_once():
 def test_the_ends_are_exact():
     schedule = LinearSchedule(0.3, 0.01, 1000)
     assert (schedule(0), schedule(1000)) == (0.3, 0.01)
+
+
+@pytest.mark.parametrize("episode", [0, 1, 33, 99, 100, 101])
+@pytest.mark.parametrize("length", [0, 0.5, 100, 99.9])
+def test_a_schedule_is_its_line(episode, length):
+    assert LinearSchedule(1.0, 0.1, length)(episode) == on_line(1.0, 0.1, length, episode)
+
+
+def test_a_slope_of_part_of_an_episode_has_its_start():
+    assert [LinearSchedule(1.0, 0.1, 0.5)(episode) for episode in (0, 1)] == [1.0, 0.1]
+
+
+def test_whole_numbers_are_numbers():
+    assert [LinearSchedule(1, 0, 4)(episode) for episode in range(6)] == [1, 0.75, 0.5, 0.25, 0, 0]

@@ -1,15 +1,26 @@
 """Trainings repeat exactly, and learn."""
 
+import copy
 import doctest
+import itertools
 
+import gymnasium
 import numpy as np
 import pytest
 
 from mjcartpole.errors import ModelNotFoundError
-from mjcartpole.learning import training
+from mjcartpole.learning import compiled, training
 from mjcartpole.learning.config import PRESETS, TrainConfig
 from mjcartpole.learning.training import Training, train
+from mjcartpole.physics.model import load_model
 from mjcartpole.studies.evaluation import evaluate
+
+ENGINES = ("python", "compiled")
+
+
+@pytest.fixture
+def short_chunks(monkeypatch):
+    monkeypatch.setattr(compiled, "CHUNK_STEPS", 100)
 
 
 def test_the_docstrings_hold():
@@ -45,24 +56,145 @@ def test_what_a_dimension_without_bins_ignores():
 
 
 def test_a_training_can_be_left_at_any_episode():
-    unfinished = Training(TrainConfig(episodes=100, seed=2))
-    for episode in unfinished.run():
-        if episode.number == 9:
+    unfinished = Training(TrainConfig(episodes=100, seed=2), engine="python")
+    for finished in unfinished.run():
+        if finished == 10:
             break
     result = unfinished.result()
-    assert len(result.returns) == 10
+    assert len(result.returns) == len(result.episodes) == 10
     assert result.policy([0.0, 0.0, 0.1, 0.0]) in (0, 1)
     assert Training(TrainConfig()).result().steps == 0
 
 
-def test_a_result_is_not_changed_by_later_episodes():
-    unfinished = Training(TrainConfig(episodes=30))
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_training_counts_its_episodes(engine, short_chunks):
+    training = Training(TrainConfig(episodes=90, seed=2), engine=engine)
+    counts = []
+    for finished in training.run():
+        assert finished == len(training.log)
+        counts.append(finished)
+    assert counts == sorted(set(counts))
+    assert counts[-1] == 90
+    assert counts == list(range(1, 91)) or engine == "compiled"
+    assert len(counts) > 5
+    assert list(training.run()) == [], "there is nothing left to do"
+    assert len(training.log) == 90
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_result_is_not_changed_by_later_episodes(engine, short_chunks):
+    unfinished = Training(TrainConfig(episodes=30), engine=engine)
     episodes = unfinished.run()
     next(episodes)
     result = unfinished.result()
-    before = result.q_table.copy()
+    before, logged = result.q_table.copy(), list(result.episodes)
+    assert 0 < len(logged) < 30
     list(episodes)
     np.testing.assert_array_equal(result.q_table, before)
+    assert list(result.episodes) == logged
+    assert unfinished.result().steps > result.steps
+
+
+def snapshots_of(config, engine):
+    """A snapshot before each chunk and at the end, with what it held when it was taken."""
+    training = Training(config, engine=engine)
+    snapshots = [training.snapshot()]
+    held = [content(snapshots[0])]
+    for _ in training.run():
+        snapshots.append(training.snapshot())
+        held.append(content(snapshots[-1]))
+    return snapshots, held
+
+
+def content(snapshot):
+    return (
+        snapshot.q_table.tobytes(),
+        copy.deepcopy(snapshot.env_rng),
+        copy.deepcopy(snapshot.learner_rng),
+        [column.tobytes() for column in snapshot.columns],
+        snapshot.seconds,
+    )
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"backend": "mujoco"},
+        {"backend": "gym"},
+        {"backend": "mujoco", "td_lambda": None, "ties": "random"},
+        {"backend": "gym", "td_lambda": None, "ties": "random"},
+        {"integrator": "mujoco"},
+    ],
+)
+def test_a_training_goes_on_from_any_snapshot_with_either_engine(changes, short_chunks):
+    config = TrainConfig(episodes=60, seed=4, **changes)
+    snapshots, held = snapshots_of(config, "compiled")
+    assert len(snapshots) > 5
+    *final, seconds = held[-1]
+    assert seconds > 0
+    places = [0, 1, len(snapshots) // 2, len(snapshots) - 1]
+    for place, engine in itertools.product(places, ENGINES):
+        training = Training(config, engine=engine)
+        training.restore(snapshots[place])
+        for _ in training.run():
+            pass
+        *found, seconds = content(training.snapshot())
+        assert found == final
+        assert seconds >= held[place][-1]
+    assert [content(snapshot) for snapshot in snapshots] == held, "later episodes changed one"
+
+
+@pytest.mark.parametrize(("first", "second"), [ENGINES, ENGINES[::-1]])
+def test_engines_may_take_turns(first, second, short_chunks):
+    config = TrainConfig(episodes=60, seed=9)
+    snapshots, _ = snapshots_of(config, first)
+    training = Training(config, engine=second)
+    training.restore(snapshots[len(snapshots) // 3])
+    chunks = training.run()
+    next(chunks)
+    last = Training(config, engine=first)
+    last.restore(training.snapshot())
+    for _ in last.run():
+        pass
+    assert content(last.snapshot())[:-1] == content(snapshots[-1])[:-1]
+
+
+def test_a_training_can_be_set_back(short_chunks):
+    """Restoring does not only work on a fresh training."""
+    config = TrainConfig(episodes=40, seed=1)
+    for engine in ENGINES:
+        training = Training(config, engine=engine)
+        start = training.snapshot()
+        for _ in training.run():
+            pass
+        first = content(training.snapshot())[:-1]
+        training.restore(start)
+        assert len(training.log) == 0
+        for _ in training.run():
+            pass
+        assert content(training.snapshot())[:-1] == first
+
+
+def test_an_environment_of_ones_own_is_trained_on():
+    config = TrainConfig(backend="gym", episodes=15, seed=3)
+    env = gymnasium.make("CartPole-v1")
+    own = Training(config, env)
+    assert own.engine == "python"
+    for _ in own.run():
+        pass
+    assert own.result().q_table.tobytes() == train(config).q_table.tobytes()
+
+
+def test_a_loaded_model_is_taken_as_it_is():
+    heavy = load_model(load_model().xml.replace('mass="0.1"', 'mass="0.9"'))
+    config = TrainConfig(episodes=15, seed=3)
+    tables = []
+    for engine in ENGINES:
+        training = Training(config, engine=engine, cartpole=heavy)
+        for _ in training.run():
+            pass
+        tables.append(training.result().q_table.tobytes())
+    assert tables[0] == tables[1] != train(config).q_table.tobytes()
 
 
 def test_an_unknown_model_is_refused_before_any_work():

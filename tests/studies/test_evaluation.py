@@ -2,7 +2,9 @@
 
 import pytest
 
-from mjcartpole.errors import ConfigError
+from mjcartpole.errors import ConfigError, ModelNotFoundError
+from mjcartpole.learning.config import TrainConfig
+from mjcartpole.learning.training import train
 from mjcartpole.studies.evaluation import evaluate
 
 
@@ -45,6 +47,44 @@ def test_the_summary_is_plain():
         "minimum": pytest.approx(9, abs=2),
         "endings": {"time limit": 0, "off the track": 0, "pole fell": 2},
     }
+
+
+@pytest.mark.parametrize("backend", ["mujoco", "gym"])
+def test_both_engines_play_the_same_episodes(backend):
+    policy = train(TrainConfig(backend=backend, episodes=200, seed=3)).policy
+    compiled, python = (
+        evaluate(policy, backend=backend, episodes=15, seed=3, engine=engine)
+        for engine in ("compiled", "python")
+    )
+    assert compiled == python
+    assert compiled.returns.tolist() == [episode.steps for episode in compiled.episodes]
+    assert [episode.number for episode in compiled.episodes] == list(range(15))
+
+
+def test_a_policy_that_is_any_function_is_played_in_python():
+    policy = train(TrainConfig(episodes=200, seed=3)).policy
+    assert evaluate(policy.__call__, episodes=5) == evaluate(policy, episodes=5)
+
+
+def test_evaluating_changes_no_policy():
+    policy = train(TrainConfig(episodes=20)).policy
+    table, actions = policy.q_table.copy(), policy.actions.copy()
+    evaluate(policy, episodes=3)
+    assert policy.q_table.tobytes() == table.tobytes()
+    assert policy.actions.tobytes() == actions.tobytes()
+
+
+@pytest.mark.parametrize("engine", ["compiled", "python"])
+def test_settings_that_make_no_sense_are_refused_whoever_plays(engine):
+    policy = train(TrainConfig(episodes=2)).policy
+    with pytest.raises(ConfigError, match="backend 'bullet' is unknown"):
+        evaluate(policy, backend="bullet", engine=engine)
+    with pytest.raises(ConfigError, match="takes no model or integrator"):
+        evaluate(policy, backend="gym", integrator="mujoco", engine=engine)
+    with pytest.raises(ConfigError, match="whole number from 1 up, not 0"):
+        evaluate(policy, episodes=0, engine=engine)
+    with pytest.raises(ModelNotFoundError, match="'nothing'"):
+        evaluate(policy, model="nothing", engine=engine)
 
 
 @pytest.mark.parametrize("arguments", [{"episodes": 0}, {"episodes": -1}, {"seed": -1}])

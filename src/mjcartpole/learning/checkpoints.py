@@ -15,24 +15,41 @@ import dataclasses
 import hashlib
 import io
 import json
-import os
 import zipfile
+import zlib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+import numpy.typing as npt
 
-from mjcartpole.errors import CheckpointError, FileError
-from mjcartpole.files import replacing
+from mjcartpole.errors import CheckpointError
+from mjcartpole.files import replacing, sync
 from mjcartpole.learning.config import TrainConfig
-from mjcartpole.learning.episodes import Columns
+from mjcartpole.learning.episodes import ENDINGS, Columns
 from mjcartpole.learning.training import Snapshot
+from mjcartpole.task import N_ACTIONS
 
 LATEST, PREVIOUS = "checkpoint.bin", "checkpoint-previous.bin"
 
 _HEAD: Final = b"mjcartpole checkpoint 1 "
 _DIGEST_LENGTH: Final = 64
+_NOT_UNDERSTOOD: Final = (
+    ArithmeticError,
+    AttributeError,
+    EOFError,
+    LookupError,
+    MemoryError,
+    NotImplementedError,
+    OSError,
+    RecursionError,
+    TypeError,
+    ValueError,
+    zipfile.BadZipFile,
+    zlib.error,
+)
+"""What reading an archive that somebody else put together may raise."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,8 +87,10 @@ def save_checkpoint(folder: Path, checkpoint: Checkpoint) -> None:
     content = _pack(checkpoint)
     with replacing(latest) as temporary:
         temporary.write_bytes(content)
+        sync(temporary)
+        # Killed right here, a training goes on from the previous one, which is as good.
         if latest.exists():
-            _link(latest, previous)
+            latest.replace(previous)
 
 
 def load_checkpoint(path: Path, config: TrainConfig, document: str) -> Checkpoint:
@@ -97,8 +116,9 @@ def load_checkpoint(path: Path, config: TrainConfig, document: str) -> Checkpoin
         raise CheckpointError(f"'{path}' is cut off or was altered: its checksum does not match")
     try:
         checkpoint = _unpack(archive)
-    except (KeyError, TypeError, ValueError, zipfile.BadZipFile) as error:
-        raise CheckpointError(f"'{path}' cannot be understood: {error}") from error
+    except _NOT_UNDERSTOOD as error:
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise CheckpointError(f"'{path}' cannot be understood: {reason}") from error
     _check_same(path, checkpoint, config, document)
     return checkpoint
 
@@ -110,7 +130,8 @@ def keep_only(folder: Path, path: Path) -> None:
         FileError: The folder cannot be written.
     """
     if path.absolute() != (folder / LATEST).absolute():
-        _link(path, folder / LATEST)
+        with replacing(folder / LATEST) as temporary:
+            temporary.write_bytes(path.read_bytes())
 
 
 def _check_same(path: Path, checkpoint: Checkpoint, config: TrainConfig, document: str) -> None:
@@ -156,18 +177,31 @@ def _unpack(content: bytes) -> Checkpoint:
             env_rng=about["env_rng"],
             learner_rng=about["learner_rng"],
             columns=Columns(archive["totals"], archive["steps"], archive["endings"]),
-            seconds=about["seconds"],
+            seconds=float(about["seconds"]),
         )
-    return Checkpoint(TrainConfig(**about["config"]), about["model"], snapshot)
+    config = TrainConfig(**about["config"])
+    _check_snapshot(snapshot, config)
+    return Checkpoint(config, str(about["model"]), snapshot)
 
 
-def _link(existing: Path, name: Path) -> None:
-    """Give a file a second name, which then takes the place of whatever had it."""
-    try:
-        with replacing(name) as temporary:
-            temporary.unlink()
-            os.link(existing, temporary)
-    except FileError:
-        # A file system without hard links: a copy does.
-        with replacing(name) as temporary:
-            temporary.write_bytes(existing.read_bytes())
+def _check_snapshot(snapshot: Snapshot, config: TrainConfig) -> None:
+    """Refuse numbers that no training with this config can have come to.
+
+    Raises:
+        ValueError: See above.
+    """
+    table, columns = snapshot.q_table, snapshot.columns
+    n = len(columns.totals)
+    expected = {"totals": np.float64, "steps": np.int32, "endings": np.int8}
+    if table.dtype != np.float64 or table.shape != (config.discretizer.n_states, N_ACTIONS):
+        raise ValueError(f"a table of {table.dtype} with shape {table.shape}")
+    arrays: dict[str, npt.NDArray[Any]] = columns._asdict()
+    if any(
+        arrays[name].dtype != kind or arrays[name].shape != (n,) for name, kind in expected.items()
+    ):
+        raise ValueError("columns of episodes that do not fit together")
+    if n > config.episodes or not np.isin(columns.endings, range(len(ENDINGS))).all():
+        raise ValueError("episodes that the training does not have")
+    states: tuple[Any, Any] = (snapshot.env_rng, snapshot.learner_rng)
+    for state in states:
+        np.random.PCG64().state = state

@@ -19,21 +19,24 @@ from mjcartpole.learning.policy import Policy
 from mjcartpole.learning.qlearning import TabularQ
 from mjcartpole.physics.cartpole_v1 import FORCE
 from mjcartpole.physics.library import libmujoco
-from mjcartpole.physics.model import ModelLike, load_model
+from mjcartpole.physics.model import CartPole, ModelLike, load_model
 from mjcartpole.physics.simulation import Simulation, check_sane
 
 CHUNK_STEPS: Final = 50_000
 """Steps between two looks at what else is to be done: a twentieth of a second in MuJoCo."""
 
-_ALL: Final = 2**62
+LEAST_MEMORY: Final = 2**20
+"""Bytes. Where MuJoCo runs out of its memory it ends the process, unless Python has called it."""
 
 _log = logging.getLogger("mjcartpole")
 
 
-def unavailable(backend: Backend) -> str:
+def unavailable(backend: Backend, cartpole: CartPole | None = None) -> str:
     """Why the compiled engine cannot run here; empty if it can."""
     if config.DISABLE_JIT:  # type: ignore[attr-defined]
         return "NUMBA_DISABLE_JIT is set"
+    if cartpole is not None and cartpole.model.narena < LEAST_MEMORY:
+        return f"{cartpole.name} gives MuJoCo so little memory that it may run out of it"
     return kernels.link(libmujoco()) if backend == "mujoco" else ""
 
 
@@ -61,6 +64,7 @@ class CompiledLoop:
             actions=np.zeros(limit, np.int64),
             rewards=np.zeros(limit, np.float64),
             failure=np.full(5, -1.0),
+            finished=np.zeros(1, np.int64),
         )
 
     def learn(
@@ -95,15 +99,20 @@ class CompiledLoop:
         )
         number = numbers.start
         while number < numbers.stop:
-            number = _run(
-                kernels.learn_chunk,
-                *common,
-                (number, numbers.stop),
-                CHUNK_STEPS,
-                log.storage,
-                self._scratch,
-            )
-            log.extend_to(number)
+            self._scratch.finished[0] = number
+            try:
+                _run(
+                    kernels.learn_chunk,
+                    *common,
+                    (number, numbers.stop),
+                    CHUNK_STEPS,
+                    log.storage,
+                    self._scratch,
+                )
+            finally:
+                # A signal that came meanwhile is raised before `_run` can return anything.
+                number = int(self._scratch.finished[0])
+                log.extend_to(number)
             self._check(number)
             yield number
 
@@ -114,19 +123,18 @@ class CompiledLoop:
             SimulationError: The physics diverged; names episode and step.
         """
         log = EpisodeLog(episodes)
-        number = _run(
-            kernels.play_chunk,
-            self._physics,
-            _arrays(policy.discretizer.grid),
-            policy.actions,
-            env_rng,
-            (0, episodes),
-            _ALL,
-            log.storage,
-            self._scratch.failure,
-        )
-        self._check(number)
-        log.extend_to(number)
+        common = (self._physics, _arrays(policy.discretizer.grid), policy.actions, env_rng)
+        while len(log) < episodes:
+            number = _run(
+                kernels.play_chunk,
+                *common,
+                (len(log), episodes),
+                CHUNK_STEPS,
+                log.storage,
+                self._scratch.failure,
+            )
+            log.extend_to(number)
+            self._check(number)
         return log
 
     def _check(self, number: int) -> None:
@@ -134,6 +142,7 @@ class CompiledLoop:
         steps, *state = self._scratch.failure.tolist()
         if steps < 0:
             return
+        self._scratch.failure[0] = -1.0
         assert self._simulation is not None
         try:
             x, x_dot, theta, theta_dot = state
@@ -211,6 +220,7 @@ def _run(kernel: Callable[..., int], *arguments: object) -> int:
     with event.install_listener("numba:compile", _Announcer()):
         try:
             return kernel(*arguments)
-        except OSError:
-            # It is compiled, but the cache cannot be written (a full disk): go on without.
-            return kernel(*arguments)
+        except Exception:
+            # A kernel raises nothing itself. Its cache cannot be read or written (damaged, a full
+            # disk; numba lets through OSError, EOFError and what pickle raises): go on without.
+            return kernels.uncached(kernel)(*arguments)

@@ -14,6 +14,9 @@ from mjcartpole.integrator import Integrator
 from mjcartpole.learning.discretizer import Discretizer, is_finite
 from mjcartpole.learning.qlearning import Ties
 
+MAX_EPISODES: Final = 1_000_000_000
+"""More than anybody waits for; the log of so many takes 13 GB."""
+
 DIMENSIONS: Final = ("x", "x_dot", "theta", "theta_dot")
 
 # The article's ranges, as its code has them: the float32 bound of the angle, and 3.5 rad/s.
@@ -133,6 +136,8 @@ class TrainConfig:
             value = getattr(self, name)
             if type(value) is not int or value < least:
                 raise ConfigError(f"{name} must be a whole number from {least} up, not {value!r}")
+        if self.episodes > MAX_EPISODES:
+            raise ConfigError(f"episodes must be at most {MAX_EPISODES:,}, not {self.episodes:,}")
 
     def _check_numbers(self) -> None:
         names = ["gamma", "alpha", "alpha_final", "epsilon", "epsilon_final", "decay"]
@@ -141,7 +146,8 @@ class TrainConfig:
             if not (is_finite(value) and 0 <= value <= 1):
                 raise ConfigError(f"{name} must be a number from 0 to 1, not {value!r}")
         low, high = self.q_init_low, self.q_init_high
-        if not (is_finite(low) and is_finite(high) and low <= high):
+        if not (is_finite(low) and is_finite(high) and low <= high and is_finite(high - low)):
             raise ConfigError(
-                f"q_init_low and q_init_high must be finite and in order, not {low!r} and {high!r}"
+                "q_init_low and q_init_high must be finite, in order and not too far apart, "
+                f"not {low!r} and {high!r}"
             )

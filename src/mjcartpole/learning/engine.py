@@ -1,10 +1,13 @@
 """Who runs the loop: the compiled engine, or the reference loop in Python."""
 
 import logging
-from typing import Literal, get_args
+from typing import TYPE_CHECKING, Literal, get_args
 
 from mjcartpole.envs.backend import Backend
 from mjcartpole.errors import ConfigError
+
+if TYPE_CHECKING:
+    from mjcartpole.physics.model import CartPole
 
 Engine = Literal["compiled", "python"]
 """`compiled`: the loop compiled by Numba; `python`: the same in Python. They give the same bits."""
@@ -13,19 +16,33 @@ _log = logging.getLogger("mjcartpole")
 _said: set[str] = set()
 
 
-def choose_engine(engine: str, backend: Backend) -> Engine:
+def check_engine(engine: str) -> None:
+    """Refuse an engine that does not exist.
+
+    Raises:
+        ConfigError: See above.
+    """
+    if engine not in get_args(Engine):
+        raise ConfigError(f"engine {engine!r} is unknown; available: {', '.join(get_args(Engine))}")
+
+
+def choose_engine(engine: str, backend: Backend, cartpole: "CartPole | None" = None) -> Engine:
     """The engine that was asked for, or the reference loop where that one cannot run.
 
     Logs one line, once, where the reference loop takes over.
 
+    Args:
+        engine: What was asked for.
+        backend: Who does the physics.
+        cartpole: The model, where it is known and the backend is mujoco.
+
     Raises:
         ConfigError: There is no such engine.
     """
-    if engine not in get_args(Engine):
-        raise ConfigError(f"engine {engine!r} is unknown; available: {', '.join(get_args(Engine))}")
+    check_engine(engine)
     if engine == "python":
         return "python"
-    why_not = _why_not_compiled(backend)
+    why_not = _why_not_compiled(backend, cartpole)
     if not why_not:
         return "compiled"
     if why_not not in _said:
@@ -38,10 +55,10 @@ def choose_engine(engine: str, backend: Backend) -> Engine:
     return "python"
 
 
-def _why_not_compiled(backend: Backend) -> str:
+def _why_not_compiled(backend: Backend, cartpole: "CartPole | None") -> str:
     try:
         # Numba is heavy, and refuses to be imported beside a NumPy that is newer than it knows.
         from mjcartpole.learning import compiled  # noqa: PLC0415
     except (ImportError, OSError) as error:
         return f"Numba does not work: {error}"
-    return compiled.unavailable(backend)
+    return compiled.unavailable(backend, cartpole)

@@ -132,7 +132,7 @@ def claimed_folder(folder: Path, *, overwrite: bool = False) -> Iterator[None]:
             try:
                 yield
             finally:
-                if not before and not {LATEST, *RESULTS} & _content(folder):
+                if not before and not {LATEST, PREVIOUS, *RESULTS} & _content(folder):
                     _remove(folder, reversed(BEGINNING))
     finally:
         with contextlib.suppress(OSError):
@@ -257,7 +257,8 @@ def remove_run(folder: Path) -> None:
 
 def is_complete(folder: Path) -> bool:
     """Whether a folder holds a run to which nothing is left to do."""
-    return (folder / SUMMARY).is_file() and not (folder / LATEST).exists()
+    going_on = (folder / name for name in (LATEST, PREVIOUS))
+    return (folder / SUMMARY).is_file() and not any(path.exists() for path in going_on)
 
 
 def load_run(folder: str | os.PathLike[str]) -> Run:
@@ -346,8 +347,9 @@ def _checkpoint(folder: Path, path: Path, config: TrainConfig, document: str) ->
     latest, previous = folder / LATEST, folder / PREVIOUS
     if path.is_file():
         return load_checkpoint(path, config, document)
-    if not latest.exists() and not previous.exists():
-        return None
+    if not latest.exists():
+        # Nothing was saved yet, or it was killed between two moves (see save_checkpoint).
+        return load_checkpoint(previous, config, document) if previous.exists() else None
     try:
         return load_checkpoint(latest, config, document)
     except CheckpointError as error:

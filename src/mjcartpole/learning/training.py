@@ -13,13 +13,13 @@ from gymnasium.utils import seeding
 from mjcartpole import task
 from mjcartpole.envs.backend import make_env
 from mjcartpole.learning.config import TrainConfig
-from mjcartpole.learning.engine import Engine, choose_engine
+from mjcartpole.learning.engine import Engine, check_engine, choose_engine
 from mjcartpole.learning.episodes import Columns, EpisodeLog
 from mjcartpole.learning.loop import learn_episodes
 from mjcartpole.learning.policy import Policy
 from mjcartpole.learning.qlearning import TabularQ
 from mjcartpole.learning.schedules import LinearSchedule
-from mjcartpole.physics.model import CartPole
+from mjcartpole.physics.model import CartPole, load_model
 
 LEARNER_STREAM: Final = 1
 """Spawn key of the learner's generator: its draws are independent of the env's."""
@@ -108,19 +108,28 @@ class Training:
             ConfigError: There is no such engine.
             ModelError: The model cannot be used.
         """
+        check_engine(engine)
         self.config = config
         self.learner = _make_learner(config)
         self.log = EpisodeLog(config.episodes)
-        self.engine = "python" if env else choose_engine(engine, config.backend)
         self._env_rng, _ = seeding.np_random(config.seed)
         self._seconds = 0.0
-        model = config.model if cartpole is None else cartpole
+        self.engine: Engine = "python"
+        if env is not None:
+            self._env = env
+            return
+        if config.backend == "gym":
+            cartpole = None
+        elif cartpole is None:
+            cartpole = load_model(config.model)
+        physics = (config.backend, cartpole or config.model, config.integrator)
+        self.engine = choose_engine(engine, config.backend, cartpole)
         if self.engine == "compiled":
             from mjcartpole.learning.compiled import CompiledLoop  # noqa: PLC0415 - it is heavy
 
-            self._loop = CompiledLoop(config.backend, model, config.integrator)
+            self._loop = CompiledLoop(*physics)
         else:
-            self._env = env or make_env(config.backend, model, config.integrator)
+            self._env = make_env(*physics)
 
     def run(self) -> Iterator[int]:
         """Train to the end.

@@ -178,7 +178,10 @@ def _explicit_euler(
         ctrl[0] = control
         x = qpos[slider] + h * qvel[slider]
         theta = qpos[hinge] + h * qvel[hinge]
-        mj_step(model, data)
+        try:
+            mj_step(model, data)
+        except mujoco.FatalError as error:
+            raise _gave_up(cartpole, error) from error
         qpos[slider] = x
         qpos[hinge] = theta
         return x, qvel[slider], theta, qvel[hinge]
@@ -200,10 +203,18 @@ def _own_integrator(
 
     def step(control: float) -> State:
         ctrl[0] = control
-        mj_step(model, data, substeps)
+        try:
+            mj_step(model, data, substeps)
+        except mujoco.FatalError as error:
+            raise _gave_up(cartpole, error) from error
         return qpos[slider], qvel[slider], qpos[hinge], qvel[hinge]
 
     return step
+
+
+def _gave_up(cartpole: CartPole, error: mujoco.FatalError) -> SimulationError:
+    reason = " ".join(str(error).split())
+    return SimulationError(f"MuJoCo gave up on {cartpole.name}: {reason}")
 
 
 def silence_mujoco() -> None:

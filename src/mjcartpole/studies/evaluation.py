@@ -93,7 +93,13 @@ def evaluate(
     """
     check_count(episodes, seed)
     check_backend(backend, model, integrator)
-    engine = choose_engine(engine, backend)
+    if backend == "mujoco":
+        from mjcartpole.physics.model import load_model  # noqa: PLC0415 - it imports MuJoCo
+
+        model = load_model(model)
+        engine = choose_engine(engine, backend, model)
+    else:
+        engine = choose_engine(engine, backend)
     if engine == "compiled" and isinstance(policy, Policy):
         from mjcartpole.learning.compiled import CompiledLoop  # noqa: PLC0415 - it is heavy
 

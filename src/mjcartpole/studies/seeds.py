@@ -166,12 +166,13 @@ class Crew:
         self.seeds = _check_seeds(config, seeds)
         self.workers = min(_check_workers(workers), len(self.seeds))
         self._config = config
-        self._engine = choose_engine(engine, config.backend)
+        on_mujoco = config.backend == "mujoco"
+        self._engine = choose_engine(engine, config.backend, cartpole if on_mujoco else None)
         self._jobs = [
             _Job(
                 config=dataclasses.replace(config, seed=seed),
                 engine=self._engine,
-                document=cartpole.xml if config.backend == "mujoco" else None,
+                document=cartpole.xml if on_mujoco else None,
                 folder=None if folder is None else folder / f"seed-{seed}",
                 preset=preset,
                 every=every,
