@@ -25,6 +25,7 @@ TOP = {
     "signals",
     "commands",
     "train_command",
+    "render_command",
     "parity_command",
     "cli",
     "__main__",

@@ -77,24 +77,6 @@ def test_training_leaves_a_complete_run_and_its_evaluation_repeats(run, capsys):
     assert Policy.load(run / "policy.json").q_table.tobytes() == policy.q_table.tobytes()
 
 
-def test_what_training_prints(here, capsys):
-    code, out, err = call(["train", "--episodes", "25", "--log-every", "10", "--no-video"], capsys)
-    assert (code, err) == (0, "")
-    assert re.search(r"^tuned on mujoco: 25 episodes, seed 0$", out, re.M)
-    returns = train(TrainConfig(episodes=25)).returns
-    for end, block in ((10, returns[:10]), (20, returns[10:20]), (25, returns[20:])):
-        assert re.search(rf"^\s+{end}\s+{block.mean():.1f}$", out, re.M)
-    assert "run    runs/tuned-mujoco-seed0" in out
-    assert (here / "runs" / "tuned-mujoco-seed0" / "summary.json").is_file()
-    assert not (here / "videos").exists()
-
-
-def test_a_second_training_takes_the_next_free_folder(here, capsys):
-    for name in ("tuned-gym-seed0", "tuned-gym-seed0-2"):
-        assert call(["train", "--backend", "gym", *QUICK], capsys)[0] == 0
-        assert (here / "runs" / name / "policy.json").is_file()
-
-
 def test_an_existing_run_is_only_overwritten_on_request(run, capsys):
     before = {path.name: path.read_bytes() for path in run.iterdir()}
     again = ["train", *QUICK, "--seed", "4", "--run-dir", "runs/mine"]
@@ -182,6 +164,14 @@ BAD = [
     (["train", "--run-dir", "/proc/nothing"], "cannot make the folder"),
     (["train", "--run-dir", "full"], "holds other files"),
     (["train", "--run-dir", "a-file"], "a-file"),
+    (["train", "--engine", "fast"], "fast"),
+    (["train", "--checkpoint-every", "-1"], "checkpoint-every must be a number of seconds"),
+    (["train", "--seeds", "0"], "seeds must be a number from 1"),
+    (["train", "--workers", "2"], "--workers is for several --seeds"),
+    (["train", "--resume", "nowhere"], "no run folder or checkpoint 'nowhere'"),
+    (["train", "--resume", "full"], "'full' holds no training that could be continued"),
+    (["train", "--resume", "a-file"], "holds no training that could be continued"),
+    (["train", "--resume", "RUN", "--seed", "9"], "leave out --seed"),
     (["train", "--overwriet"], "perhaps you meant --overwrite"),
     (["fly"], "fly"),
     (["evaluate"], "RUN-OR-POLICY"),
@@ -218,14 +208,6 @@ def test_a_mistake_is_one_line_and_exit_code_2(run, arguments, message, here, ca
     assert err.count("\n") == 1
     assert message in err
     assert {path: path.read_bytes() for path in here.rglob("*") if path.is_file()} == before
-
-
-def test_an_unwritable_videos_folder_is_noticed_before_training(here, capsys):
-    (here / "videos").write_text("a file in the way")
-    code, out, err = call(["train"], capsys)
-    assert (code, out) == (2, "")
-    assert "videos" in err
-    assert not list(here.glob("runs/*/*"))
 
 
 def start(arguments, here):

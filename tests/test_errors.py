@@ -7,7 +7,7 @@ from mjcartpole import errors
 
 def test_all_errors_share_one_base():
     classes = [cls for _, cls in inspect.getmembers(errors, inspect.isclass)]
-    assert len(classes) == 14
+    assert len(classes) == 15
     assert all(issubclass(cls, errors.MjCartPoleError) for cls in classes)
 
 
@@ -21,3 +21,9 @@ def test_errors_that_callers_of_gymnasium_expect():
 def test_the_drawing_names_every_class():
     for name, cls in inspect.getmembers(errors, inspect.isclass):
         assert name in (errors.__doc__ or ""), cls
+
+
+def test_a_bad_checkpoint_is_a_run_that_cannot_be_used():
+    assert issubclass(errors.CheckpointError, errors.RunError)
+    assert issubclass(errors.RunError, errors.FileError)
+    assert issubclass(errors.PolicyFileError, errors.FileError)

@@ -9,7 +9,14 @@ import time
 import pytest
 
 from mjcartpole.errors import FileError
-from mjcartpole.files import check_writable, make_folder, replacing, write_whole
+from mjcartpole.files import (
+    check_writable,
+    is_temporary,
+    make_folder,
+    remove_leftovers,
+    replacing,
+    write_whole,
+)
 
 
 def test_writes_and_replaces(tmp_path):
@@ -98,3 +105,26 @@ def test_a_kill_leaves_the_old_file_or_the_new_one(tmp_path):
         writer.send_signal(signal.SIGKILL)
         writer.communicate()
         assert path.read_text() in {"0" * 200_000, "1" * 200_000}
+
+
+@pytest.mark.parametrize(
+    "name", ["file.txt", "file", "checkpoint-previous.bin", "two.dots.txt", "a-b_c.json"]
+)
+def test_what_a_killed_writer_leaves_is_known_and_removed(name, tmp_path):
+    (tmp_path / "sub").mkdir()
+    for other in (name, ".hidden", ".lock", ".file-12345678", "file-12345678.txt"):
+        (tmp_path / other).write_text("kept")
+    (tmp_path / ".file-12345678").unlink()
+    with replacing(tmp_path / name) as temporary:
+        assert is_temporary(temporary.name)
+        copy = temporary.read_bytes()
+    temporary.write_bytes(copy)  # As a kill would have left it.
+    assert not is_temporary(name)
+    remove_leftovers(tmp_path)
+    left = sorted(path.name for path in tmp_path.iterdir())
+    assert left == sorted({name, ".hidden", ".lock", "file-12345678.txt", "sub"})
+
+
+def test_the_probe_of_a_folder_leaves_nothing(tmp_path):
+    check_writable(tmp_path)
+    assert list(tmp_path.iterdir()) == []

@@ -7,6 +7,7 @@ after Ctrl-C. Heavy modules are imported by the command that needs them, so `--h
 import contextlib
 import dataclasses
 import io
+import json
 import logging
 import os
 import sys
@@ -26,10 +27,11 @@ from mjcartpole.learning.engine import Engine
 from mjcartpole.studies.evaluation import EPISODES
 
 INTERRUPTED = 130
-COMMANDS = ("train", "evaluate", "render", "parity")
+COMMANDS = ("train", "evaluate", "render", "parity", "doctor")
 
 
 Against = Literal["cartpole-v1", "itself"]
+Quality = Literal["draft", "normal", "high"]
 
 
 @dataclass(frozen=True)
@@ -61,10 +63,8 @@ class Train:
 
 @dataclass(frozen=True)
 class _Played:
-    """What evaluating and filming have in common: a policy, and where it is played."""
+    """What evaluating and filming have in common: where a policy is played."""
 
-    source: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="RUN-OR-POLICY")]
-    """A run folder or a policy file."""
     backend: Backend | None = None
     """Who does the physics; the run's own if left out."""
     model: str | None = None
@@ -79,6 +79,10 @@ class _Played:
 class Evaluate(_Played):
     """Play greedy episodes from fresh starting states, and count."""
 
+    source: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="RUN-OR-POLICY")] = (
+        tyro.MISSING
+    )
+    """A run folder or a policy file."""
     episodes: int = EPISODES
     """How many."""
     json: bool = False
@@ -87,16 +91,32 @@ class Evaluate(_Played):
 
 @dataclass(frozen=True)
 class Render(_Played):
-    """Film one greedy episode: the first that an evaluation with the same seed plays."""
+    """Film greedy episodes, the first that an evaluation with the same seed plays."""
 
+    sources: Annotated[
+        tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="RUN-OR-POLICY …")
+    ] = tyro.MISSING
+    """Run folders or policy files; several are shown side by side, from the same start."""
     output: Annotated[Path | None, tyro.conf.arg(aliases=["-o"])] = None
-    """The video, .mp4 or .gif; videos/<name>.mp4 if left out."""
+    """An .mp4, .gif or .webp, or a folder for pictures; videos/<name>.mp4 if left out."""
+    episodes: int = 1
+    """How many, one after the other."""
     camera: str = "side"
     """A camera of the model."""
-    width: int = 640
-    """Pixels."""
-    height: int = 480
-    """Pixels."""
+    size: str = "640x480"
+    """Pixels, width x height, of each run's picture."""
+    quality: Quality = "normal"
+    """draft is quick, high is fine, normal is what the model's file says."""
+    overlay: bool = False
+    """Write step, return, state, action and action values into the picture."""
+    speed: float = 1.0
+    """0.25 is four times slower than the motion."""
+    fps: float = 50.0
+    """Frames per second."""
+    fall: bool = False
+    """Show the last second of each episode alone, four times slower."""
+    sheet: bool = False
+    """Write equally spaced frames as one .png instead of a video."""
 
 
 @dataclass(frozen=True)
@@ -115,7 +135,15 @@ class Parity:
     """Write every figure to this file."""
 
 
-Command = Train | Evaluate | Render | Parity
+@dataclass(frozen=True)
+class Doctor:
+    """Say what was found here: versions, OpenGL, encoders, and what to install."""
+
+    json: bool = False
+    """Print JSON."""
+
+
+Command = Train | Evaluate | Render | Parity | Doctor
 
 
 class UsageError(MjCartPoleError):
@@ -145,8 +173,11 @@ def _run(argv: list[str]) -> int:
         return 0
     command = parse(argv or ["--help"])
     _report_to_stderr()
-    if isinstance(command, Train):
-        return _train(command)
+    match command:
+        case Train():
+            return _train(command)
+        case Doctor():
+            return _examine(command)
     from mjcartpole import commands  # noqa: PLC0415 - it imports MuJoCo
 
     match command:
@@ -158,14 +189,7 @@ def _run(argv: list[str]) -> int:
                 as_json=command.json,
             )
         case Render():
-            return commands.run_render(
-                command.source,
-                commands.Choice(**_choice(command)),
-                output=command.output,
-                camera=command.camera,
-                width=command.width,
-                height=command.height,
-            )
+            return _render(command)
         case Parity():
             from mjcartpole import parity_command  # noqa: PLC0415 - it imports SciPy
 
@@ -176,6 +200,14 @@ def _run(argv: list[str]) -> int:
                 quick=command.quick,
                 output=command.json,
             )
+
+
+def _examine(command: Doctor) -> int:
+    from mjcartpole.media import doctor  # noqa: PLC0415 - it imports MuJoCo
+
+    report = doctor.examine()
+    print(json.dumps(report.as_dict(), indent=2) if command.json else report.text())
+    return 0
 
 
 def _train(command: Train) -> int:
@@ -197,6 +229,40 @@ def _train(command: Train) -> int:
     if command.workers is not None:
         raise ConfigError("--workers is for several --seeds")
     return train_command.run_train(command.config, how, where)
+
+
+def _render(command: Render) -> int:
+    from mjcartpole import commands, render_command  # noqa: PLC0415 - they import MuJoCo
+    from mjcartpole.studies.film import Look  # noqa: PLC0415
+
+    if not command.sources:
+        raise UsageError("render needs a RUN-OR-POLICY, or several; see mjcartpole render --help")
+    width, height = _parse_size(command.size)
+    look = Look(
+        width=width,
+        height=height,
+        camera=command.camera,
+        quality=command.quality,
+        overlay=command.overlay,
+        speed=command.speed,
+        fps=command.fps,
+        fall=command.fall,
+    )
+    return render_command.run_render(
+        command.sources,
+        commands.Choice(**_choice(command)),
+        look,
+        episodes=command.episodes,
+        output=command.output,
+        sheet=command.sheet,
+    )
+
+
+def _parse_size(text: str) -> tuple[int, int]:
+    width, _, height = text.lower().partition("x")
+    if not (width.isdecimal() and height.isdecimal()):
+        raise UsageError(f"--size is a width and a height in pixels, such as 640x480, not '{text}'")
+    return int(width), int(height)
 
 
 def _check_only_resumed(command: Train) -> None:
@@ -249,6 +315,7 @@ def parse(argv: Sequence[str]) -> Command:
         | Annotated[Evaluate, tyro.conf.subcommand("evaluate")]
         | Annotated[Render, tyro.conf.subcommand("render")]
         | Annotated[Parity, tyro.conf.subcommand("parity")]
+        | Annotated[Doctor, tyro.conf.subcommand("doctor")]
     )
     complaint = io.StringIO()
     try:

@@ -1,23 +1,17 @@
-"""What evaluate and render do and print."""
+"""What `evaluate` does and prints, and how a policy and its stage are found."""
 
 import json
 from dataclasses import dataclass
 from pathlib import Path
 
-from rich.console import Console
-from rich.progress import track
-
-from mjcartpole.envs.backend import Backend, make_env
+from mjcartpole.envs.backend import Backend
 from mjcartpole.integrator import Integrator
 from mjcartpole.learning import runs
-from mjcartpole.learning.loop import play_episode
 from mjcartpole.learning.policy import Policy
-from mjcartpole.media.renderer import open_renderer
-from mjcartpole.media.video import write_video
-from mjcartpole.physics.model import ModelLike, load_model
 from mjcartpole.physics.simulation import silence_mujoco
 from mjcartpole.studies import evaluation
 from mjcartpole.studies.evaluation import Evaluation, check_count, evaluate
+from mjcartpole.studies.film import Stage
 
 RUNS = Path("runs")
 VIDEOS = Path("videos")
@@ -33,21 +27,9 @@ class Choice:
     seed: int | None = None
 
 
-@dataclass(frozen=True)
-class Stage:
-    """A policy and where it is played, all questions answered."""
-
-    name: str
-    policy: Policy
-    backend: Backend
-    model: ModelLike
-    integrator: Integrator
-    seed: int
-
-
 def run_evaluate(source: Path, choice: Choice, *, episodes: int, as_json: bool) -> int:
     """Play greedy episodes and print the figures. Returns the exit code."""
-    stage = _set_stage(source, choice)
+    stage = set_stage(source, choice)
     result = _evaluate(stage, episodes)
     if as_json:
         print(json.dumps({"policy": str(source), "model": str(stage.model), **result.summary()}))
@@ -56,17 +38,7 @@ def run_evaluate(source: Path, choice: Choice, *, episodes: int, as_json: bool) 
     return 0
 
 
-def run_render(
-    source: Path, choice: Choice, *, output: Path | None, camera: str, width: int, height: int
-) -> int:
-    """Film one greedy episode. Returns the exit code."""
-    stage = _set_stage(source, choice)
-    path = output or VIDEOS / f"{stage.name}.mp4"
-    film(stage, path, camera=camera, width=width, height=height)
-    return 0
-
-
-def _set_stage(source: Path, choice: Choice) -> Stage:
+def set_stage(source: Path, choice: Choice) -> Stage:
     """Find a policy, and where to play it: as it was trained, unless the user chose otherwise."""
     silence_mujoco()
     seed = evaluation.SEED if choice.seed is None else choice.seed
@@ -99,24 +71,6 @@ def _evaluate(stage: Stage, episodes: int) -> Evaluation:
         episodes=episodes,
         seed=stage.seed,
     )
-
-
-def film(stage: Stage, path: Path, *, camera: str, width: int, height: int) -> None:
-    """Play the stage's first episode and write it as a video."""
-    env = make_env(stage.backend, stage.model, stage.integrator)
-    episode, states = play_episode(env, stage.policy, seed=stage.seed)
-    env.close()
-    cartpole = load_model(stage.model)
-    with open_renderer(cartpole, width=width, height=height, camera=camera) as renderer:
-        console = Console(stderr=True)
-        shown = track(
-            states, "filming", console=console, transient=True, disable=not console.is_terminal
-        )
-        write_video(path, (renderer.render(state) for state in shown))
-        print(
-            f"video  {path}  ({episode.steps} steps, {episode.ending}; "
-            f"{width}x{height}, drawn by {renderer.kind})"
-        )
 
 
 def print_evaluation(result: Evaluation) -> None:

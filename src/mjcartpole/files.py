@@ -9,7 +9,7 @@ from pathlib import Path
 
 from mjcartpole.errors import FileError
 
-_TEMPORARY = re.compile(r"\.[\w-]+-[0-9a-f]{8}(\.\w+)?")
+_TEMPORARY = re.compile(r"\.[\w.-]+-[0-9a-f]{8}(\.\w+)?")
 """What `_make_temporary` calls them."""
 
 

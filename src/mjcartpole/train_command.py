@@ -16,7 +16,8 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
-from mjcartpole.commands import RUNS, VIDEOS, Stage, film, print_evaluation
+from mjcartpole.commands import RUNS, VIDEOS, print_evaluation
+from mjcartpole.errors import ConfigError
 from mjcartpole.files import check_writable, make_folder
 from mjcartpole.learning import runs, tensorboard
 from mjcartpole.learning.checkpoints import LATEST
@@ -26,9 +27,11 @@ from mjcartpole.learning.session import CHECKPOINT_EVERY, Session, check_interva
 from mjcartpole.learning.training import Training, TrainResult
 from mjcartpole.physics.model import CartPole, load_model
 from mjcartpole.physics.simulation import silence_mujoco
+from mjcartpole.render_command import film
 from mjcartpole.signals import Interrupted, StopSignals
-from mjcartpole.studies import evaluation, seed_runs
+from mjcartpole.studies import seed_runs
 from mjcartpole.studies.conduct import conclude
+from mjcartpole.studies.film import Look, Stage, play
 from mjcartpole.studies.seeds import Crew, ManyResult
 from mjcartpole.studies.statistics import CONFIDENCE
 
@@ -109,8 +112,12 @@ def run_resume(path: Path, how: How) -> int:
     _check(how)
     if (path / seed_runs.SEEDS).is_file():
         return _resume_seeds(path, how)
+    if how.workers is not None:
+        raise ConfigError("--workers is for several --seeds")
     folder = runs.run_folder(path)
-    if runs.is_complete(folder):
+    if path.is_dir() and runs.is_complete(folder):
+        with runs.locked_folder(folder):
+            pass  # A lock that a killed training has left goes.
         print(f"{folder} is complete: nothing is left to do")
         return 0
     signals = StopSignals()
@@ -180,7 +187,11 @@ def _conduct(
         with signals.deferred():
             _train_with_progress(session, signals)
             result, summary, greedy = conclude(
-                session, folder, cartpole, preset=preset, events=how.tensorboard
+                session,
+                folder,
+                cartpole,
+                preset=preset,
+                events=how.tensorboard or runs.has_events(folder),
             )
         _print_learning(result)
         if signals.stop() or greedy is None:
@@ -214,10 +225,9 @@ def _film_result(
         backend=config.backend,
         model=cartpole if config.backend == "mujoco" else "cartpole",
         integrator=config.integrator,
-        seed=evaluation.SEED,
     )
     path = VIDEOS / f"{stage.name}.mp4"
-    film(stage, path, camera="side", width=640, height=480)
+    film([play(stage)], Look(), path)
     summary["video"] = str(path)
     runs.write_summary(folder, summary)
 

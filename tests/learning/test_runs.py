@@ -1,14 +1,17 @@
 """What a training leaves on disk, and how it is read back."""
 
+import contextlib
 import csv
 import json
 
 import pytest
 
-from mjcartpole.errors import FileError, ModelError, PolicyFileError, RunError
+from mjcartpole.errors import CheckpointError, FileError, ModelError, PolicyFileError, RunError
 from mjcartpole.learning import runs
+from mjcartpole.learning.checkpoints import LATEST, PREVIOUS
 from mjcartpole.learning.config import TrainConfig
-from mjcartpole.learning.training import train
+from mjcartpole.learning.session import Session
+from mjcartpole.learning.training import Training, train
 from mjcartpole.physics.model import load_model, same_model
 
 
@@ -21,8 +24,8 @@ def result():
 def run(result, tmp_path):
     folder = tmp_path / "run"
     with runs.claimed_folder(folder):
-        runs.write_run(folder, result, load_model(), preset="article")
-        runs.write_summary(folder, {"episodes": 12})
+        runs.begin_run(folder, result.config, load_model(), preset="article", video=True)
+        runs.write_results(folder, result, {"episodes": 12})
     return folder
 
 
@@ -128,3 +131,147 @@ def test_a_model_that_needs_other_files_is_refused_before_training(tmp_path):
     with pytest.raises(ModelError, match="needs other files beside it"):
         runs.check_storable(load_model(tmp_path / "mesh.xml"))
     runs.check_storable(load_model())
+
+
+def checkpointed(folder, config, episodes):
+    """Leave checkpoints in a folder, as a training that was killed does."""
+    training = Training(config)
+    cartpole = load_model(config.model)
+    session = Session(folder, training, cartpole, every=0)
+    for _ in training.run():
+        if len(training.log) >= episodes:
+            break
+    session.save()
+    session.save()
+
+
+@pytest.fixture
+def begun(result, tmp_path):
+    """A run that was killed, with two checkpoints."""
+    folder = tmp_path / "begun"
+    with contextlib.suppress(KeyboardInterrupt), runs.claimed_folder(folder):
+        runs.begin_run(folder, result.config, load_model(), preset="article", video=True)
+        checkpointed(folder, result.config, 5)
+        raise KeyboardInterrupt
+    return folder
+
+
+def resumed(path):
+    with runs.resumed_folder(path) as found:
+        return found
+
+
+def test_a_run_that_was_begun_comes_back(begun, result):
+    for path in (begun, begun / LATEST, begun / PREVIOUS):
+        found = resumed(path)
+        assert (found.folder, found.preset, found.video) == (begun, "article", True)
+        assert found.config == result.config
+        assert found.cartpole.name == "cartpole"
+        assert same_model(found.cartpole.model, load_model().model)
+        assert found.checkpoint.episodes >= 5
+    assert sorted(path.name for path in begun.iterdir()) == sorted(
+        [*runs.BEGINNING, LATEST, PREVIOUS]
+    )
+
+
+def test_a_run_without_checkpoints_begins_again(begun):
+    for name in (LATEST, PREVIOUS):
+        (begun / name).unlink()
+    assert resumed(begun).checkpoint is None
+
+
+def test_the_checkpoint_that_is_chosen_becomes_the_latest(begun):
+    good = (begun / PREVIOUS).read_bytes()
+    (begun / LATEST).unlink()
+    (begun / LATEST).write_bytes(b"damaged")
+    with pytest.raises(CheckpointError, match=f"is good: mjcartpole train --resume .*{PREVIOUS}"):
+        resumed(begun)
+    assert (begun / LATEST).read_bytes() == b"damaged"
+    resumed(begun / PREVIOUS)
+    assert (begun / LATEST).read_bytes() == good
+
+
+def test_two_bad_checkpoints(begun):
+    for name in (LATEST, PREVIOUS):
+        (begun / name).unlink()
+        (begun / name).write_bytes(b"damaged")
+    with pytest.raises(CheckpointError, match="there is no good one before it"):
+        resumed(begun)
+
+
+def test_a_folder_is_locked_once(begun):
+    with runs.resumed_folder(begun):
+        with pytest.raises(RunError, match="in use by another training"):
+            resumed(begun)
+        with pytest.raises(RunError, match="in use by another training"):
+            claim(begun, overwrite=True)
+        with pytest.raises(RunError, match="in use by another training"):
+            runs.remove_run(begun)
+    resumed(begun)
+    assert not (begun / runs.LOCK).exists()
+
+
+def test_a_run_is_complete_when_its_checkpoints_are_gone(begun, result):
+    assert not runs.is_complete(begun)
+    runs.write_results(begun, result, {"episodes": 12})
+    assert not runs.is_complete(begun)
+    runs.finish_run(begun)
+    assert runs.is_complete(begun)
+    assert sorted(path.name for path in begun.iterdir()) == sorted(runs.FILES)
+    assert runs.read_summary(begun) == {"episodes": 12}
+    assert runs.load_run(begun).preset == "article"
+
+
+def test_a_run_without_results_says_how_to_go_on(begun):
+    with pytest.raises(RunError, match=f"policy.json missing; go on with .*--resume {begun}"):
+        runs.load_run(begun)
+
+
+@pytest.mark.parametrize("text", ["", "{", None])
+def test_a_summary_that_cannot_be_read(run, text):
+    (run / runs.SUMMARY).unlink()
+    if text is not None:
+        (run / runs.SUMMARY).write_text(text)
+    with pytest.raises(RunError, match=r"summary\.json' cannot be read"):
+        runs.read_summary(run)
+
+
+def test_beginning_again_mixes_nothing_with_the_older_run(begun, result):
+    (begun / "events.out.tfevents.1.x").write_text("of the older run")
+    with runs.claimed_folder(begun, overwrite=True):
+        runs.begin_run(begun, result.config, load_model(), preset="tuned")
+        assert sorted(path.name for path in begun.iterdir()) == sorted([*runs.BEGINNING, runs.LOCK])
+
+
+def test_removing_a_run_removes_nothing_else(begun):
+    (begun / "notes.txt").write_text("mine")
+    (begun / "events.out.tfevents.1.x").write_text("of the run")
+    runs.remove_run(begun)
+    assert [path.name for path in begun.iterdir()] == ["notes.txt"]
+    (begun / "notes.txt").unlink()
+    runs.remove_run(begun)
+    assert not begun.exists()
+    runs.remove_run(begun)
+
+
+@pytest.mark.parametrize("left", [[], [runs.VERSIONS], [runs.VERSIONS, runs.MODEL]])
+def test_what_a_kill_in_the_first_moment_leaves_is_no_obstacle(left, tmp_path, result):
+    for name in left:
+        (tmp_path / name).write_text("left by a kill")
+    (tmp_path / ".model-0123abcd.xml").write_text("left by a kill")
+    (tmp_path / runs.LOCK).write_text("")
+    with runs.claimed_folder(tmp_path):
+        runs.begin_run(tmp_path, result.config, load_model(), preset="article")
+        assert sorted(path.name for path in tmp_path.iterdir()) == sorted(
+            [*runs.BEGINNING, runs.LOCK]
+        )
+
+
+@pytest.mark.parametrize("overwrite", [False, True])
+@pytest.mark.parametrize("names", [["model.xml"], ["model.xml", "thesis.tex"], ["seeds.json"]])
+def test_files_of_somebody_else_are_never_taken(names, overwrite, tmp_path):
+    for name in names:
+        (tmp_path / name).write_text("years of work")
+    with pytest.raises(RunError, match="holds other files"):
+        claim(tmp_path, overwrite=overwrite)
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(names)

@@ -3,7 +3,6 @@ import math
 import numpy as np
 import pytest
 
-from mjcartpole.media.outlines import convex_hull
 from mjcartpole.media.renderer import open_renderer
 from mjcartpole.physics.model import load_model
 
@@ -183,16 +182,44 @@ def test_the_sky_is_the_background():
     assert frame[0, 0] == pytest.approx([51, 102, 153], abs=1)
 
 
-def test_the_convex_hull_of_points():
-    square = [(0, 0), (2, 0), (2, 2), (0, 2)]
-    inside = [(1, 1), (0.5, 1.5), (1, 0), (2, 1)]
-    hull = convex_hull(np.array(square + inside, float))
-    assert sorted(map(tuple, hull.tolist())) == sorted(square)
+INSIDES = ["box", "sphere", "capsule", "cylinder", "ellipsoid"]
 
 
-def test_the_convex_hull_of_very_many_points_loses_little():
-    turn = np.linspace(0, 2 * np.pi, 5000)
-    hull = convex_hull(np.column_stack([np.cos(turn), np.sin(turn)]))
-    x, y = hull.T
-    area = abs(np.dot(x, np.roll(y, 1)) - np.dot(y, np.roll(x, 1))) / 2
-    assert area == pytest.approx(math.pi, rel=0.01)
+@pytest.mark.parametrize("kind", INSIDES)
+@pytest.mark.parametrize("projection", ["perspective", "orthographic"])
+def test_a_camera_inside_of_a_shape_or_touching_it_does_no_harm(kind, projection):
+    document = ORTHOGRAPHIC.replace("orthographic", projection).replace('fovy="2"', 'fovy="60"')
+    for y in (-3.0, -2.99, -3.5, -2.5):
+        inside = f'<geom type="{kind}" size="0.5 0.5 0.5" pos="0 {y} 0" {RED}/>'
+        far = f'<geom type="box" size="0.3 0.1 0.3" {BLUE}/>'
+        draw(shapes(far, inside, document), theta=0.3)
+
+
+def test_a_shape_that_reaches_behind_the_camera_is_cut():
+    document = ORTHOGRAPHIC.replace('projection="orthographic" fovy="2"', 'fovy="60"')
+    rail = f'<geom type="capsule" size="0.05" fromto="0 -9 -0.3 0 9 -0.3" {RED}/>'
+    frame = draw(shapes("", rail, document))
+    assert frame[199, 100, 0] > 0
+    assert frame[110:, :, 0].any(axis=1).all()
+
+
+def test_a_plane_without_end_reaches_the_horizon():
+    document = ORTHOGRAPHIC.replace('projection="orthographic" fovy="2"', 'fovy="60"')
+    ground = f'<geom type="plane" size="0 0 1" pos="0 0 -0.5" {RED}/>'
+    reds = draw(shapes("", ground, document))[..., 0].sum(axis=1)
+    assert (reds[:99] == 0).all()
+    assert (reds[110:] == 200 * 255).all()
+
+
+@pytest.mark.parametrize("kind", INSIDES)
+def test_a_shape_that_is_see_through_is_blended_once(kind):
+    wall = f'<geom type="plane" size="5 5 1" zaxis="0 -1 0" pos="0 1 0" {BLUE}/>'
+    geom = f'<geom type="{kind}" size="0.2 0.2 0.2" rgba="1 0 0 0.5"/>'
+    assert draw(shapes(geom, wall))[100, 100] == pytest.approx([127, 0, 127], abs=2)
+
+
+def test_a_size_that_is_no_number_is_left_out():
+    cartpole = shapes(f'<geom name="odd" type="capsule" size="0.1 0.2" {RED}/>')
+    cartpole.model.geom("odd").size[:] = np.nan
+    with open_renderer(cartpole, kind="sketch", width=64, height=48) as renderer:
+        assert renderer.render((0.0, 0.0, 0.0, 0.0)).max() == 0

@@ -47,10 +47,13 @@ from mjcartpole.physics.model import CartPole, load_model, same_model
 
 CONFIG, VERSIONS, MODEL = "config.json", "versions.json", "model.xml"
 EPISODES, POLICY, SUMMARY, TIMING = "episodes.csv", "policy.json", "summary.json", "timing.json"
-BEGINNING: Final = (MODEL, VERSIONS, CONFIG)
+BEGINNING: Final = (VERSIONS, MODEL, CONFIG)
+"""In the order of writing: what a kill leaves of them is known by the versions."""
 RESULTS: Final = (EPISODES, POLICY, TIMING, SUMMARY)
 FILES: Final = (*BEGINNING, *RESULTS)
 LOCK: Final = ".lock"
+EVENTS: Final = "events.out.tfevents.*"
+"""TensorBoard's (see tensorboard.py)."""
 
 PACKAGES: Final = ("mjcartpole", "mujoco", "dm-control", "gymnasium", "numpy", "numba", "imageio")
 
@@ -128,11 +131,11 @@ def claimed_folder(folder: Path, *, overwrite: bool = False) -> Iterator[None]:
         with locked_folder(folder):
             _check_free(folder, overwrite)
             remove_leftovers(folder)
-            before = _content(folder)
+            before = content_of(folder)
             try:
                 yield
             finally:
-                if not before and not {LATEST, PREVIOUS, *RESULTS} & _content(folder):
+                if not before and not {LATEST, PREVIOUS, *RESULTS} & content_of(folder):
                     _remove(folder, reversed(BEGINNING))
     finally:
         with contextlib.suppress(OSError):
@@ -193,9 +196,9 @@ def begin_run(
         FileError: The folder cannot be written.
     """
     # The config first: without it a folder holds no run, so that two are never mixed.
-    _remove(folder, (CONFIG, *FILES, LATEST, PREVIOUS))
+    _remove_files(folder)
+    write_versions(folder)
     write_whole(folder / MODEL, cartpole.xml)
-    write_whole(folder / VERSIONS, _json(versions()))
     about = {"preset": preset, "video": video, **dataclasses.asdict(config)}
     write_whole(folder / CONFIG, _json(about))
 
@@ -211,6 +214,15 @@ def write_results(folder: Path, result: TrainResult, summary: dict[str, Any]) ->
     seconds = round(result.seconds, 3)
     write_whole(folder / TIMING, _json({"training_seconds": seconds, "steps": result.steps}))
     write_summary(folder, summary)
+
+
+def write_versions(folder: Path) -> None:
+    """Write the versions of all that a result may depend on.
+
+    Raises:
+        FileError: The folder cannot be written.
+    """
+    write_whole(folder / VERSIONS, _json(versions()))
 
 
 def write_summary(folder: Path, summary: dict[str, Any]) -> None:
@@ -249,7 +261,7 @@ def remove_run(folder: Path) -> None:
     if not folder.is_dir():
         return
     with locked_folder(folder):
-        _remove(folder, (CONFIG, *FILES, LATEST, PREVIOUS))
+        _remove_files(folder)
         remove_leftovers(folder)
     with contextlib.suppress(OSError):
         folder.rmdir()  # Only an empty one goes.
@@ -257,8 +269,13 @@ def remove_run(folder: Path) -> None:
 
 def is_complete(folder: Path) -> bool:
     """Whether a folder holds a run to which nothing is left to do."""
-    going_on = (folder / name for name in (LATEST, PREVIOUS))
-    return (folder / SUMMARY).is_file() and not any(path.exists() for path in going_on)
+    content = content_of(folder)
+    return {CONFIG, SUMMARY} <= content and not content & {LATEST, PREVIOUS}
+
+
+def has_events(folder: Path) -> bool:
+    """Whether TensorBoard events were written for a run."""
+    return any(folder.glob(EVENTS))
 
 
 def load_run(folder: str | os.PathLike[str]) -> Run:
@@ -366,13 +383,14 @@ def _checkpoint(folder: Path, path: Path, config: TrainConfig, document: str) ->
 
 
 def _check_free(folder: Path, overwrite: bool) -> None:
-    content = _content(folder)
-    ours = {*FILES, LATEST, PREVIOUS}
-    if content and not content & ours:
-        raise RunError(f"'{folder}' holds other files and is no run; choose another --run-dir")
+    content = content_of(folder)
     # A training that was killed in its first moment leaves no config: nothing is lost with it.
-    if CONFIG not in content and not content & set(RESULTS):
+    # A model alone is somebody's own: ours lies beside the versions.
+    killed = VERSIONS in content and content <= {MODEL, VERSIONS, LATEST, PREVIOUS}
+    if not content or killed:
         return
+    if CONFIG not in content and not content & set(RESULTS):
+        raise RunError(f"'{folder}' holds other files and is no run; choose another --run-dir")
     if not overwrite:
         unfinished = f", go on with --resume {folder}" if not is_complete(folder) else ""
         raise RunError(
@@ -381,7 +399,7 @@ def _check_free(folder: Path, overwrite: bool) -> None:
         )
 
 
-def _content(folder: Path) -> set[str]:
+def content_of(folder: Path) -> set[str]:
     """Names of what lies in a folder, without what a killed training may have left behind."""
     if not folder.is_dir():
         return set()
@@ -391,6 +409,12 @@ def _content(folder: Path) -> set[str]:
 def _remove(folder: Path, names: Iterable[str]) -> None:
     for name in names:
         (folder / name).unlink(missing_ok=True)
+
+
+def _remove_files(folder: Path) -> None:
+    """Remove all files of a run, the config first."""
+    events = (path.name for path in folder.glob(EVENTS))
+    _remove(folder, (CONFIG, MODEL, *events, *RESULTS, LATEST, PREVIOUS, VERSIONS))
 
 
 def _read_config(path: Path) -> tuple[str, bool, TrainConfig]:

@@ -1,5 +1,6 @@
 """A run's learning curve as TensorBoard events, by tensorboardX: it needs no framework."""
 
+import contextlib
 import importlib.util
 from pathlib import Path
 from typing import Final
@@ -7,10 +8,11 @@ from typing import Final
 import numpy as np
 
 from mjcartpole.errors import ConfigError
+from mjcartpole.files import replacing
 from mjcartpole.learning.schedules import LinearSchedule
 from mjcartpole.learning.training import TrainResult
 
-PATTERN: Final = "events.out.tfevents.*"
+NAME: Final = "events.out.tfevents.0.mjcartpole"
 POINTS: Final = 10_000
 """The most points of a curve; longer trainings are drawn as means of blocks."""
 
@@ -34,19 +36,28 @@ def write_events(folder: Path, result: TrainResult) -> None:
         ConfigError: tensorboardX is not installed.
     """
     check_installed()
-    from tensorboardX import SummaryWriter  # noqa: PLC0415 - an optional package
+    # Not its SummaryWriter: that one writes in a thread of its own, and hangs on a full disk.
+    from tensorboardX.proto.event_pb2 import Event  # noqa: PLC0415 - an optional package
+    from tensorboardX.record_writer import RecordWriter  # noqa: PLC0415
+    from tensorboardX.summary import scalar  # noqa: PLC0415
 
     config, returns = result.config, result.returns
     slope = config.decay * config.episodes
     alpha = LinearSchedule(config.alpha, config.alpha_final, slope)
     epsilon = LinearSchedule(config.epsilon, config.epsilon_final, slope)
-    for old in folder.glob(PATTERN):
-        old.unlink()
-    with SummaryWriter(str(folder)) as writer:
+    with (
+        replacing(folder / NAME) as temporary,
+        contextlib.closing(RecordWriter(str(temporary))) as writer,
+    ):
+        writer.write(Event(wall_time=0, file_version="brain.Event:2").SerializeToString())
         for block in np.array_split(np.arange(len(returns)), min(POINTS, max(len(returns), 1))):
             if not block.size:
                 continue
             number = int(block[-1])
-            writer.add_scalar("train/return", float(returns[block].mean()), number + 1)
-            writer.add_scalar("train/alpha", alpha(number), number + 1)
-            writer.add_scalar("train/epsilon", epsilon(number), number + 1)
+            for name, value in (
+                ("train/return", float(returns[block].mean())),
+                ("train/alpha", alpha(number)),
+                ("train/epsilon", epsilon(number)),
+            ):
+                event = Event(wall_time=0, step=number + 1, summary=scalar(name, value))
+                writer.write(event.SerializeToString())

@@ -5,16 +5,18 @@ faces get one colour each; round ones a few nested outlines that grow brighter t
 """
 
 import itertools
+import math
 from dataclasses import dataclass
-from typing import Any, Final, Self
+from typing import Any, Final
 
 import mujoco
 import numpy as np
 import numpy.typing as npt
 
+from mjcartpole.media.fan import Wedge
 from mjcartpole.media.scene import Scene
+from mjcartpole.media.view import Points, View, unit
 
-Points = npt.NDArray[np.float64]
 Colour = tuple[int, int, int, int]
 """Red, green, blue, opacity; 0 to 255."""
 
@@ -46,108 +48,9 @@ class Outline:
     bounds: tuple[float, float, float, float]
 
 
-@dataclass(frozen=True)
-class View:
-    """A camera as a map from points in the world to pixels.
-
-    Attributes:
-        position: Of the camera in the world, m, shape (3,).
-        axes: Columns: right, up, forward, in the world, shape (3, 3).
-        scale: Pixels per unit of the image plane, (right, down).
-        offset: Pixel of the optical axis, (right, down).
-        near: Distance of the image plane, m; nothing nearer is seen.
-        orthographic: Whether distance does not make things smaller.
-        borders: What can be seen: points whose camera coordinates (right, up, forward, 1) have
-            no negative product with a row. The first row is the near plane, then left, right,
-            top and bottom of the picture; shape (5, 4).
-        lights: The lights as they are while this camera looks.
-    """
-
-    position: Points
-    axes: Points
-    scale: Points
-    offset: Points
-    near: float
-    orthographic: bool
-    borders: Points
-    lights: "list[Light]"
-
-    @classmethod
-    def of(cls, scene: Scene) -> Self:
-        """The view of a scene's camera."""
-        # The scene holds two eyes; the camera is in the middle between them.
-        camera = mujoco.mjv_averageCamera(scene.abstract.camera[0], scene.abstract.camera[1])
-        forward, up = np.array(camera.forward, float), np.array(camera.up, float)
-        half_height = (camera.frustum_top - camera.frustum_bottom) / 2
-        half_width = camera.frustum_width or half_height * scene.width / scene.height
-        half = np.array([half_width, half_height])
-        size = np.array([scene.width, scene.height])
-        centre = np.array([camera.frustum_center, (camera.frustum_top + camera.frustum_bottom) / 2])
-        scale = size / 2 / half * (1, -1)
-        offset = size / 2 - centre * scale
-        near = float(camera.frustum_near)
-        return cls(
-            position=np.array(camera.pos, float),
-            axes=np.column_stack([np.cross(forward, up), up, forward]),
-            scale=scale,
-            offset=offset,
-            near=near,
-            orthographic=bool(camera.orthographic),
-            borders=_borders(size, scale, offset, near, bool(camera.orthographic)),
-            lights=[Light.of(scene.abstract.lights[i]) for i in range(scene.abstract.nlight)],
-        )
-
-    def towards(self, point: Points) -> Points:
-        """Unit vector from a point to the camera, shape (3,)."""
-        if self.orthographic:
-            return -self.axes[:, 2]
-        return _unit(self.position - point)
-
-    def project(self, points: Points) -> tuple[Points, Points]:
-        """Pixels, shape (n, 2), and distances from the camera, shape (n,), of points (n, 3)."""
-        seen = (points - self.position) @ self.axes
-        distances = seen[:, 2]
-        plane = seen[:, :2]
-        if not self.orthographic:
-            plane = plane * (self.near / np.maximum(distances, 1e-9))[:, None]
-        return plane * self.scale + self.offset, distances
-
-
-@dataclass(frozen=True)
-class Light:
-    """A light of a scene.
-
-    Attributes:
-        ambient: Its colour from everywhere, shape (3,).
-        diffuse: Its colour from where it is, shape (3,).
-        position: In the world, shape (3,), or None if it is as far away as the sun.
-        direction: Where it shines to, shape (3,).
-    """
-
-    ambient: Points
-    diffuse: Points
-    position: Points | None
-    direction: Points
-
-    @classmethod
-    def of(cls, light: Any) -> Self:  # noqa: ANN401
-        """A light from MuJoCo's scene."""
-        is_far = light.type == mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
-        return cls(
-            ambient=np.array(light.ambient, float),
-            diffuse=np.array(light.diffuse, float),
-            position=None if is_far else np.array(light.pos, float),
-            direction=_unit(np.array(light.dir, float)),
-        )
-
-    def on(self, point: Points, normal: Points, share: float) -> Points:
-        """Brightness of a surface, shape (3,); `share` scales what comes from the light itself."""
-        towards = -self.direction if self.position is None else _unit(self.position - point)
-        return self.ambient + self.diffuse * max(0.0, float(normal @ towards)) * share
-
-
-def outline_of(geom: Any, scene: Scene, view: View) -> Outline:  # noqa: ANN401
-    """What a view shows of a geom of MuJoCo's scene; no polygons if it shows nothing."""
+def outline_of(geom: Any, scene: Scene) -> Outline:  # noqa: ANN401
+    """What a scene's camera shows of one of its geoms; no polygons if it shows nothing."""
+    view = scene.view
     body = _Body(geom, view, scene)
     kind = mujoco.mjtGeom(geom.type)
     is_plane = kind == mujoco.mjtGeom.mjGEOM_PLANE
@@ -157,13 +60,48 @@ def outline_of(geom: Any, scene: Scene, view: View) -> Outline:  # noqa: ANN401
     nearest = 0.0 if is_plane else min(body.distances, default=0.0)
     # A plane is ground or wall: everything else stands in front of it. The farther one is first.
     far = -float((body.position - view.position) @ view.axes[:, 2]) if is_plane else -nearest
-    corners = [points for _, points in body.polygons]
-    bounds = (0.0, 0.0, 0.0, 0.0)
-    if corners:
-        low = np.min([points.min(axis=0) for points in corners], axis=0)
-        high = np.max([points.max(axis=0) for points in corners], axis=0)
-        bounds = (float(low[0]), float(low[1]), float(high[0]), float(high[1]))
-    return Outline((0 if is_plane else 1, far), body.polygons, bounds)
+    return _outline((0 if is_plane else 1, far), body.polygons)
+
+
+def outline_of_wedge(wedge: Wedge, view: View) -> Outline:
+    """What a view shows of a part of the fan."""
+    corners = _clip(wedge.corners, view, view.borders[:1])
+    if len(corners) < 3:
+        return _outline((1, 0.0), [])
+    points, distances = view.project(corners)
+    faces_camera = wedge.normal @ view.towards(wedge.corners[0]) > 0
+    normal = wedge.normal if faces_camera else -wedge.normal
+    colour = _lit(wedge.rgba, 0.0, view, corners[0], normal)
+    # By its farthest corner: the pole, which moves in the same plane, is drawn over it.
+    return _outline((1, -float(distances.max())), [(colour, points)])
+
+
+def _outline(order: tuple[int, float], polygons: list[tuple[Colour, Points]]) -> Outline:
+    """An outline and its bounds, without what no number can place."""
+    kept = [(colour, points) for colour, points in polygons if np.isfinite(points).all()]
+    if not kept:
+        return Outline(order, [], (0.0, 0.0, 0.0, 0.0))
+    corners = np.concatenate([points for _, points in kept])
+    left, top = corners.min(axis=0).tolist()
+    right, bottom = corners.max(axis=0).tolist()
+    return Outline(order, kept, (left, top, right, bottom))
+
+
+def _lit(
+    rgba: npt.NDArray[Any],
+    emission: float,
+    view: View,
+    point: Points,
+    normal: Points,
+    share: float = 1.0,
+) -> Colour:
+    """A colour under all lights, as OpenGL mixes it (without gloss)."""
+    light = np.full(3, emission)
+    for lamp in view.lights:
+        light = light + lamp.on(point, normal, share)
+    shown = [*(rgba[:3] * light).tolist(), float(rgba[3])]
+    red, green, blue, opacity = (round(255 * min(max(v, 0.0), 1.0)) for v in shown)
+    return red, green, blue, opacity
 
 
 class _Body:
@@ -205,24 +143,51 @@ class _Body:
         self.distances.append(float(distances.min()))
         self.polygons.append((self.colour(corners.mean(axis=0), outward), points))
 
+    def bands(self, ring: Points, ends: Points) -> None:
+        """Draw what a ring sweeps over between its places: a few times, narrower and brighter.
+
+        Args:
+            ring: Around the geom's middle, shape (n, 3).
+            ends: Where the ring is put, shape (k, 3).
+        """
+        # One blend of a see-through geom is enough.
+        bands = _BANDS if self.rgba[3] >= 1 else _BANDS[1:2]
+        order: list[int] = []
+        for size, depth in bands:
+            scale = size if len(bands) > 1 else 1.0
+            points = self._project((ring * scale + ends[:, None]).reshape(-1, 3))
+            if len(points) < 3:
+                return
+            if len(points) != len(ring) * len(ends):
+                self._add(convex_hull(points), depth)
+                continue
+            # Inner bands have the corners of the outermost one.
+            order = order or hull_indices(points)
+            self._add(points[order], depth)
+
     def hull(self, local: Points, depth: float) -> None:
         """Draw the outline of points; `depth` in 0 to 1 is how far off its middle it is seen."""
-        points, distances = self.view.project(self.world(local))
-        if distances.min() < self.view.near:
-            return
-        towards = self.view.towards(self.position)
+        points = self._project(local)
+        if len(points) >= 3:
+            self._add(points[hull_indices(points)], depth)
+
+    def _project(self, local: Points) -> Points:
+        """Pixels, shape (n, 2), of what of the points' hull is before the camera."""
+        seen = _in_front(self.world(local), self.view)
+        if not len(seen) or not np.isfinite(seen).all():
+            return np.empty((0, 2))
+        points, distances = self.view.project(seen)
         self.distances.append(float(distances.min()))
-        share = float(np.sqrt(1 - depth * depth))
-        self.polygons.append((self.colour(self.position, towards, share), convex_hull(points)))
+        return points
+
+    def _add(self, points: Points, depth: float) -> None:
+        share = math.sqrt(1 - depth * depth)
+        towards = self.view.towards(self.position)
+        self.polygons.append((self.colour(self.position, towards, share), points))
 
     def colour(self, point: Points, normal: Points, share: float = 1.0) -> Colour:
-        """The geom's colour under all lights, as OpenGL mixes it (without gloss)."""
-        light = np.full(3, self.emission)
-        for lamp in self.view.lights:
-            light = light + lamp.on(point, normal, share)
-        shown = np.append(self.rgba[:3] * light, self.rgba[3])
-        red, green, blue, opacity = (round(255 * min(max(v, 0.0), 1.0)) for v in shown.tolist())
-        return red, green, blue, opacity
+        """The geom's colour at a point."""
+        return _lit(self.rgba, self.emission, self.view, point, normal, share)
 
     def silhouette(self) -> Points:
         """The ring on the unit ball that the camera sees as its edge, shape (n, 3).
@@ -232,7 +197,7 @@ class _Body:
         """
         if self.view.orthographic:
             eye = (self.turn.T @ -self.view.axes[:, 2]) / self.size
-            return _ring_around(_unit(eye), 0.0, 1.0)
+            return _ring_around(unit(eye), 0.0, 1.0)
         eye = (self.turn.T @ (self.view.position - self.position)) / self.size
         distance = max(float(np.linalg.norm(eye)), 1.001)
         return _ring_around(eye / distance, 1 / distance, np.sqrt(1 - 1 / distance**2))
@@ -247,31 +212,28 @@ def _draw_box(body: _Body) -> None:
 
 
 def _draw_plane(body: _Body) -> None:
-    size = np.array([body.size[0], body.size[1], 0.0])
+    # A size of 0 stands for a plane without end: as far as the camera sees.
+    endless = 2 * body.model.vis.map.zfar * body.model.stat.extent
+    size = np.where(body.size > 0, body.size, endless) * (1, 1, 0)
     body.face(_SQUARE * size, np.array([0.0, 0.0, 1.0]), is_large=True)
 
 
 def _draw_ellipsoid(body: _Body) -> None:
-    ring = body.silhouette() * body.size
-    for size, depth in _BANDS:
-        body.hull(ring * size, depth)
+    body.bands(body.silhouette() * body.size, np.zeros((1, 3)))
 
 
 def _draw_capsule(body: _Body) -> None:
-    radius, half = body.size[0], np.array([0.0, 0.0, body.size[2]])
+    radius, half = body.size[0], body.size[2]
     body.size = np.full(3, radius)
-    ring = body.silhouette() * radius
-    for size, depth in _BANDS:
-        body.hull(np.concatenate([ring * size + half, ring * size - half]), depth)
+    body.bands(body.silhouette() * radius, np.array([[0.0, 0, half], [0, 0, -half]]))
 
 
 def _draw_cylinder(body: _Body) -> None:
-    radius, half = body.size[0], np.array([0.0, 0.0, body.size[2]])
-    for size, depth in _BANDS:
-        ring = _RING * (radius * size)
-        body.hull(np.concatenate([ring + half, ring - half]), depth)
+    ring, half = _RING * body.size[0], body.size[2]
+    body.bands(ring, np.array([[0.0, 0, half], [0, 0, -half]]))
     for end in (-1.0, 1.0):
-        body.face(_RING * radius + end * half, np.array([0.0, 0.0, end]))
+        normal = np.array([0.0, 0.0, end])
+        body.face(ring + half * normal, normal)
 
 
 def _draw_mesh(body: _Body) -> None:
@@ -294,44 +256,45 @@ _DRAWERS: Final = {
 
 
 def convex_hull(points: Points) -> Points:
-    """The corners of the convex hull of points, shape (n, 2), going around it.
+    """The corners of the convex hull of points, shape (n, 2), going around it."""
+    return points[hull_indices(points)]
+
+
+def hull_indices(points: Points) -> list[int]:
+    """Which of some points, shape (n, 2), are the corners of their hull, going around it.
 
     Andrew's monotone chain (1979, doi:10.1016/0020-0190(79)90072-3). Of very many points only
     those that lie farthest in one of some directions are looked at.
     """
+    rows = np.arange(len(points))
     if len(points) > _MANY_POINTS:
-        points = points[np.unique(np.argmax(points @ _DIRECTIONS, axis=0))]
-    ordered = sorted(map(tuple, points.tolist()))
-    return np.array(_half_hull(ordered) + _half_hull(ordered[::-1]))
+        rows = np.unique(np.argmax(points @ _DIRECTIONS, axis=0))
+    ordered = sorted(zip(*points[rows].T.tolist(), rows.tolist(), strict=True))
+    return _half_hull(ordered) + _half_hull(ordered[::-1])
 
 
-def _half_hull(ordered: list[tuple[float, ...]]) -> list[tuple[float, ...]]:
+def _half_hull(ordered: list[tuple[float, float, int]]) -> list[int]:
     """The chain from the first to the last point, without the last."""
-    chain: list[tuple[float, ...]] = []
-    for x, y in ordered:
+    chain: list[tuple[float, float, int]] = []
+    for x, y, row in ordered:
         while len(chain) >= 2:
-            (x0, y0), (x1, y1) = chain[-2], chain[-1]
+            (x0, y0, _), (x1, y1, _) = chain[-2], chain[-1]
             if (x1 - x0) * (y - y0) - (y1 - y0) * (x - x0) > 0:
                 break
             chain.pop()
-        chain.append((x, y))
-    return chain[:-1] or chain
+        chain.append((x, y, row))
+    return [row for _, _, row in chain[:-1] or chain]
 
 
-def _borders(
-    size: npt.NDArray[np.int64], scale: Points, offset: Points, near: float, orthographic: bool
-) -> Points:
-    """The rows of `View.borders`: 0 <= pixel <= size, written for camera coordinates."""
-    rows = np.zeros((5, 4))
-    rows[0, 2:] = 1.0, -near
-    # A pixel is plane * scale + offset; in perspective both sides are multiplied by distance.
-    constant = 3 if orthographic else 2
-    slope = scale if orthographic else scale * near
-    for axis in (0, 1):
-        rows[1 + 2 * axis, axis], rows[1 + 2 * axis, constant] = slope[axis], offset[axis]
-        rows[2 + 2 * axis, axis] = -slope[axis]
-        rows[2 + 2 * axis, constant] = size[axis] - offset[axis]
-    return rows
+def _in_front(points: Points, view: View) -> Points:
+    """Points, shape (n, 3), whose hull is the part before the near plane of their own hull."""
+    ahead = (points - view.position) @ view.axes[:, 2] - view.near
+    if ahead.min() >= 0 or ahead.max() < 0:
+        return points if ahead.max() >= 0 else points[:0]
+    near, far = points[ahead < 0], points[ahead >= 0]
+    share = ahead[ahead >= 0][:, None] / (ahead[ahead >= 0][:, None] - ahead[ahead < 0])
+    cuts = far[:, None] + share[..., None] * (near[None] - far[:, None])
+    return np.concatenate([far, cuts.reshape(-1, 3)])
 
 
 def _clip(corners: Points, view: View, borders: Points) -> Points:
@@ -360,10 +323,6 @@ def _clip(corners: Points, view: View, borders: Points) -> Points:
 def _ring_around(axis: Points, along: float, radius: float) -> Points:
     """A circle around a unit axis, `along` from the origin, shape (n, 3)."""
     helper = np.eye(3)[int(np.argmin(np.abs(axis)))]
-    first = _unit(np.cross(axis, helper))
+    first = unit(np.cross(axis, helper))
     second = np.cross(axis, first)
     return along * axis + radius * (_RING[:, :1] * first + _RING[:, 1:2] * second)
-
-
-def _unit(vector: Points) -> Points:
-    return vector / max(float(np.linalg.norm(vector)), 1e-12)

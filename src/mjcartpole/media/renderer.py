@@ -6,11 +6,14 @@ from typing import Final, Literal, Protocol, Self, get_args
 import mujoco
 import numpy as np
 import numpy.typing as npt
+from PIL import Image
 
 from mjcartpole.errors import RenderError
 from mjcartpole.media import gl
-from mjcartpole.media.scene import DEFAULT_CAMERA, Scene
+from mjcartpole.media.quality import DEFAULT_QUALITY, Quality
+from mjcartpole.media.scene import DEFAULT_CAMERA, Box, Scene
 from mjcartpole.media.sketch import SketchRenderer
+from mjcartpole.media.trial import Backend
 from mjcartpole.physics.model import CartPole
 
 Kind = Literal["auto", "egl", "osmesa", "glfw", "sketch"]
@@ -26,9 +29,11 @@ class Renderer(Protocol):
 
     Attributes:
         kind: Who draws: `"egl"`, `"osmesa"`, `"glfw"` or `"sketch"`.
+        scene: What was drawn last, and where it is in the picture.
     """
 
     kind: str
+    scene: Scene
 
     def render(self, state: npt.ArrayLike) -> npt.NDArray[np.uint8]:
         """Draw a state `(x, x_dot, theta, theta_dot)`; m, m/s, rad, rad/s.
@@ -56,6 +61,7 @@ def open_renderer(
     width: int = DEFAULT_WIDTH,
     height: int = DEFAULT_HEIGHT,
     camera: str = DEFAULT_CAMERA,
+    quality: Quality = DEFAULT_QUALITY,
     kind: Kind = "auto",
 ) -> Renderer:
     """Open a renderer for a model.
@@ -66,15 +72,18 @@ def open_renderer(
         height: Pixels.
         camera: The name of one of the model's cameras. A model without any is seen by a free
             camera that frames the track.
+        quality: `"normal"` draws as the model's `<visual><quality>` says, `"draft"` without
+            multisampling, shadows and reflections, `"high"` at twice the width and height, which
+            is then reduced.
         kind: `"auto"` takes OpenGL where it works and the sketch renderer where it does not.
 
     Raises:
-        RenderError: An unknown camera or kind, a size that makes no sense, or an OpenGL backend
-            that was asked for by name and does not work.
+        RenderError: An unknown camera, quality or kind, a size that makes no sense, or an OpenGL
+            backend that was asked for by name and does not work.
     """
     if kind not in get_args(Kind):
         raise RenderError(f"renderer {kind!r} is unknown; available: {', '.join(get_args(Kind))}")
-    scene = Scene(cartpole, width, height, camera)
+    scene = Scene(cartpole, width, height, camera, quality)
     if kind == "sketch":
         return SketchRenderer(scene)
     if kind != "auto":
@@ -88,7 +97,7 @@ def open_renderer(
         return SketchRenderer(scene)
 
 
-def _open_by_name(scene: Scene, backend: gl.Backend) -> "GLRenderer":
+def _open_by_name(scene: Scene, backend: Backend) -> "GLRenderer":
     if not gl.can_use(backend):
         raise RenderError(
             f"OpenGL by {backend} does not work here; use 'auto', which takes what does, "
@@ -100,22 +109,31 @@ def _open_by_name(scene: Scene, backend: gl.Backend) -> "GLRenderer":
 class GLRenderer:
     """Draws with MuJoCo's own OpenGL renderer.
 
+    On a CPU, time goes with pixels. Where camera and lights stand still, only the box around what
+    moves is drawn for each frame, through a part of the camera's window; the rest comes from a
+    picture made once.
+
     Attributes:
         kind: The OpenGL backend.
+        scene: What was drawn last.
     """
 
-    def __init__(self, scene: Scene, backend: gl.Backend) -> None:
+    def __init__(self, scene: Scene, backend: Backend) -> None:
         """Make a context and MuJoCo's resources in it.
 
         Raises:
             RenderError: The backend gives no context, or MuJoCo cannot draw into it.
         """
         self.kind: str = backend
-        self._scene = scene
-        self._rectangle = mujoco.MjrRect(0, 0, scene.width, scene.height)
-        self._flipped = np.empty((scene.height, scene.width, 3), dtype=np.uint8)
+        self.scene = scene
+        self._whole: Box = (0, 0, scene.width, scene.height)
+        self._has_background = scene.is_still and scene.is_local
+        self._background: npt.NDArray[np.uint8] | None = None
         self._drawing: mujoco.MjrContext | None = None
-        self._context = gl.make_context(backend, scene.width, scene.height)
+        enlargement = scene.level.enlargement
+        self._context = gl.make_context(
+            backend, scene.width * enlargement, scene.height * enlargement
+        )
         gl.close_at_exit(self)
         try:
             self._prepare()
@@ -126,9 +144,7 @@ class GLRenderer:
     def _prepare(self) -> None:
         self._context.make_current()
         try:
-            self._drawing = mujoco.MjrContext(
-                self._scene.model, mujoco.mjtFontScale.mjFONTSCALE_100
-            )
+            self._drawing = mujoco.MjrContext(self.scene.model, mujoco.mjtFontScale.mjFONTSCALE_100)
             mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._drawing)
         finally:
             self._context.release()
@@ -144,19 +160,46 @@ class GLRenderer:
         """
         if self._drawing is None:
             raise RenderError("the renderer is closed; open another one")
-        self._scene.show(state)
+        if self._has_background and self._background is None:
+            self.scene.show(state)
+            self.scene.hide_moving()
+            self._background = self._draw(self._whole)
+        self.scene.show(state)
+        box = None if self._background is None else self.scene.moving_box()
+        if box is None or self._background is None:
+            return self._draw(self._whole)
+        frame = self._background.copy()
+        left, top, right, bottom = box
+        if left < right and top < bottom:
+            frame[top:bottom, left:right] = self._draw(box)
+        return frame
+
+    def _draw(self, box: Box) -> npt.NDArray[np.uint8]:
+        """Draw what lies in a box of the picture; shape (bottom - top, right - left, 3)."""
+        left, top, right, bottom = box
+        if box != self._whole:
+            _look_through(self.scene, box)
+        factor = self.scene.level.enlargement
+        width, height = (right - left) * factor, (bottom - top) * factor
+        rectangle = mujoco.MjrRect(0, 0, width, height)
+        flipped = np.empty((height, width, 3), dtype=np.uint8)
         self._context.make_current()
         try:
-            mujoco.mjr_render(self._rectangle, self._scene.abstract, self._drawing)
-            mujoco.mjr_readPixels(self._flipped, None, self._rectangle, self._drawing)
+            mujoco.mjr_render(rectangle, self.scene.abstract, self._drawing)
+            mujoco.mjr_readPixels(flipped, None, rectangle, self._drawing)
         finally:
             self._context.release()
-        # OpenGL's first row is the lowest; the copy also makes the frame the caller's own.
-        return self._flipped[::-1].copy()
+        # OpenGL's first row is the lowest.
+        pixels = flipped[::-1]
+        if factor == 1:
+            return pixels.copy() if box == self._whole else pixels
+        return np.array(Image.fromarray(pixels).reduce(factor))
 
     def close(self) -> None:
         """Free MuJoCo's resources, then the context; a second call does nothing."""
         drawing, self._drawing = self._drawing, None
+        if self._context.is_lost:
+            return  # A fork's copy: it belongs to the process that made it.
         if drawing is not None:
             self._context.make_current()
             drawing.free()
@@ -178,3 +221,20 @@ class GLRenderer:
         # Frees in order where nobody has; __init__ may have failed before there was anything.
         if hasattr(self, "_context"):
             self.close()
+
+
+def _look_through(scene: Scene, box: Box) -> None:
+    """Narrow the camera's window, until the scene's next `show`, to a box of the picture."""
+    left, top, right, bottom = box
+    for camera in scene.abstract.camera:
+        middle = (camera.frustum_top + camera.frustum_bottom) / 2
+        half_height = (camera.frustum_top - camera.frustum_bottom) / 2
+        half_width = camera.frustum_width or half_height * scene.width / scene.height
+        low, high = (
+            camera.frustum_center + half_width * (2 * column / scene.width - 1)
+            for column in (left, right)
+        )
+        camera.frustum_center, camera.frustum_width = (low + high) / 2, (high - low) / 2
+        camera.frustum_top, camera.frustum_bottom = (
+            middle + half_height * (1 - 2 * row / scene.height) for row in (top, bottom)
+        )

@@ -15,14 +15,11 @@ import numpy.typing as npt
 from PIL import Image, ImageDraw
 
 from mjcartpole.errors import RenderError
-from mjcartpole.media.outlines import Outline, View, outline_of
-from mjcartpole.media.scene import Scene
+from mjcartpole.media.outlines import Outline, outline_of, outline_of_wedge
+from mjcartpole.media.scene import Box, Scene
 
-_OVERSAMPLING: Final = 4
 _BLACK: Final = (0, 0, 0)
-
-Box = tuple[int, int, int, int]
-"""Left, top, right, bottom, in pixels; right and bottom lie just outside."""
+_OPAQUE: Final = 255
 
 
 class SketchRenderer:
@@ -33,13 +30,13 @@ class SketchRenderer:
 
     Attributes:
         kind: `"sketch"`.
+        scene: What was drawn last.
     """
 
     def __init__(self, scene: Scene) -> None:
         self.kind = "sketch"
-        self._scene: Scene | None = scene
-        self._still = scene.is_camera_still
-        self._view: View | None = None
+        self.scene = scene
+        self._is_closed = False
         self._static: dict[int, Outline] = {}
         self._background: npt.NDArray[np.uint8] | None = None
         self._backdrop = _backdrop(scene.model)
@@ -53,17 +50,15 @@ class SketchRenderer:
         Raises:
             RenderError: The renderer is closed, or it is no state.
         """
-        scene = self._scene
-        if scene is None:
+        scene = self.scene
+        if self._is_closed:
             raise RenderError("the renderer is closed; open another one")
         scene.show(state)
-        if self._view is None or not self._still:
-            self._view = View.of(scene)
         whole = (0, 0, scene.width, scene.height)
         if self._background is None:
-            self._static = self._outline_static(scene, self._view)
+            self._static = self._outline_static()
             self._background = self._draw(list(self._static.values()), whole)
-        moving = self._outline_moving(scene, self._view)
+        moving = self._outline_moving()
         frame = self._background.copy()
         box = _bounds(moving, whole)
         if box is not None:
@@ -72,41 +67,47 @@ class SketchRenderer:
             frame[top:bottom, left:right] = self._draw(outlines, box)
         return frame
 
-    def _outline_static(self, scene: Scene, view: View) -> dict[int, Outline]:
+    def _outline_static(self) -> dict[int, Outline]:
         """Outlines, by place in the scene, of geoms that look the same in every frame."""
-        if not self._still:
+        scene, geoms = self.scene, self.scene.abstract.geoms
+        if not scene.is_still:
             return {}
-        model, geoms = scene.model, scene.abstract.geoms
-        static = {}
-        for index in range(scene.abstract.ngeom):
-            geom = geoms[index]
-            is_geom = geom.objtype == mujoco.mjtObj.mjOBJ_GEOM and geom.objid >= 0
-            if is_geom and model.body_weldid[model.geom_bodyid[geom.objid]] == 0:
-                static[index] = outline_of(geom, scene, view)
-        return static
+        return {
+            index: outline_of(geoms[index], scene)
+            for index in range(scene.n_geoms)
+            if scene.is_fixed(geoms[index])
+        }
 
-    def _outline_moving(self, scene: Scene, view: View) -> list[Outline]:
-        geoms, static = scene.abstract.geoms, self._static
-        indices = range(scene.abstract.ngeom)
-        return [outline_of(geoms[index], scene, view) for index in indices if index not in static]
+    def _outline_moving(self) -> list[Outline]:
+        scene, geoms = self.scene, self.scene.abstract.geoms
+        indices = [index for index in range(scene.n_geoms) if index not in self._static]
+        wedges = [outline_of_wedge(wedge, scene.view) for wedge in scene.wedges]
+        return [outline_of(geoms[index], scene) for index in indices] + wedges
 
     def _draw(self, outlines: list[Outline], box: Box) -> npt.NDArray[np.uint8]:
         """Draw what lies in a box of the picture; shape (bottom - top, right - left, 3)."""
         left, top, right, bottom = box
-        size = ((right - left) * _OVERSAMPLING, (bottom - top) * _OVERSAMPLING)
+        factor = self.scene.level.oversampling
+        size = ((right - left) * factor, (bottom - top) * factor)
         canvas = Image.new("RGB", size, self._backdrop)
-        pen = ImageDraw.Draw(canvas, "RGBA")
+        # The pen that blends is slower than the one that covers.
+        pen, blending = ImageDraw.Draw(canvas), ImageDraw.Draw(canvas, "RGBA")
         for outline in sorted(outlines, key=lambda outline: outline.order):
             if not _meet(outline.bounds, box):
                 continue
             for colour, points in outline.polygons:
-                corners = (points - (left, top)) * _OVERSAMPLING
-                pen.polygon(corners.ravel().tolist(), fill=colour)
-        return np.asarray(canvas.reduce(_OVERSAMPLING))
+                corners = (points - (left, top)) * factor
+                if colour[3] == _OPAQUE:
+                    pen.polygon(corners.ravel().tolist(), fill=colour[:3])
+                else:
+                    blending.polygon(corners.ravel().tolist(), fill=colour)
+        return np.asarray(canvas.reduce(factor))
 
     def close(self) -> None:
-        """Let go of the scene; a second call does nothing."""
-        self._scene = None
+        """Let go of the pictures; a second call does nothing."""
+        self._is_closed = True
+        self._background = None
+        self._static = {}
 
     def __enter__(self) -> Self:
         return self

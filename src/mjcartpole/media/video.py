@@ -2,64 +2,168 @@
 
 import contextlib
 import itertools
+import logging
 import os
-import subprocess
-import tempfile
-from collections.abc import Iterable, Iterator
+import queue
+import signal
+import threading
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, Final
+from types import FrameType
+from typing import Final, NoReturn
 
 import numpy as np
 import numpy.typing as npt
 
 from mjcartpole.errors import RenderError
 from mjcartpole.files import replacing
+from mjcartpole.media.encoders import FFmpeg, find_ffmpeg, why_not_the_first
+from mjcartpole.media.h264 import even, write_mp4
+from mjcartpole.media.pictures import check_folder, replacing_folder, write_pictures
 
 Frame = npt.NDArray[np.uint8]
 """A picture of shape (height, width, 3): red, green, blue."""
 
-FORMATS: Final = (".mp4", ".gif")
-"""What `write_video` writes, by the file's suffix."""
+FORMATS: Final = (".mp4", ".gif", ".webp")
+"""What `write_video` writes, by the file's suffix; a path without one is a folder of png."""
 
 DEFAULT_FPS: Final = 50
 """Frames per second of real time, since a control step takes 0.02 s."""
 
-_GIF_COLOURS: Final = 64
-# GIF counts in hundredths of a second, and browsers slow down anything shorter than two.
-_SHORTEST_GIF_FRAME: Final = 2
+_MOST_FPS: Final = 1000
+_FRAMES_AHEAD: Final = 4
+"""How many frames may wait for the encoder."""
+
+_log = logging.getLogger("mjcartpole")
+
+
+@dataclass(frozen=True)
+class Video:
+    """What was written.
+
+    Attributes:
+        path: The file, or the folder of pictures; not the one asked for where mp4 became gif.
+        frames: How many it holds.
+        width: Pixels; one less than the frames' where the codec takes no odd number.
+        height: Pixels; likewise.
+        fps: Frames per second; less than asked for where the format has a limit.
+    """
+
+    path: Path
+    frames: int
+    width: int
+    height: int
+    fps: float
 
 
 def write_video(
-    path: str | os.PathLike[str], frames: Iterable[Frame], *, fps: int = DEFAULT_FPS
-) -> int:
-    """Write frames as a video: H.264 for `.mp4`, an endless loop for `.gif`.
+    path: str | os.PathLike[str], frames: Iterable[Frame], *, fps: float = DEFAULT_FPS
+) -> Video:
+    """Write frames as a video: H.264 for `.mp4`, an endless loop for `.gif` and `.webp`.
 
-    The file appears when it is complete; if anything goes wrong, what was there stays.
+    A path without a suffix, or one that ends with `/`, is a folder for 000000.png, 000001.png, ….
+    The file or folder appears when it is complete; if anything goes wrong, what was there stays.
+    Whatever differs from what was asked for is in the result, and a line in the log.
 
     Args:
-        path: Where to; the suffix chooses the format.
+        path: Where to.
         frames: Pictures of shape (height, width, 3), uint8, all of one size. H.264 stores
-            colours for blocks of 2 by 2 pixels, so both sizes have to be even.
+            colours for blocks of 2 by 2 pixels: of odd sizes the last row or column is cut off.
         fps: Frames per second.
-
-    Returns:
-        The number of frames written.
 
     Raises:
         RenderError: An unknown format, no frames, frames that do not fit, or a failing encoder.
-        FileError: The file cannot be written.
+        FileError: The file cannot be written, or a folder holds other things than pictures.
     """
-    suffix = Path(path).suffix.lower()
-    if suffix not in FORMATS:
-        raise RenderError(f"'{path}' is no video format that can be written; use .mp4 (or .gif)")
-    if fps < 1:
-        raise RenderError(f"fps {fps!r} makes no sense; use a number of frames per second from 1")
-    first, stream = _peek(frames)
-    checked = _checked(stream, first.shape)
-    with replacing(path) as temporary:
-        if suffix == ".gif":
-            return _write_gif(temporary, checked, fps)
-        return _write_mp4(temporary, checked, first.shape, fps)
+    suffix = check_path(path)
+    if not 0 < fps <= _MOST_FPS:
+        raise RenderError(
+            f"fps {fps!r} makes no sense; use a number of frames per second up to {_MOST_FPS}"
+        )
+    target = Path(path)
+    ffmpeg = _find_ffmpeg(target) if suffix == ".mp4" else None
+    if suffix == ".mp4" and ffmpeg is None:
+        suffix, target = ".gif", target.with_suffix(".gif")
+    with _ended_by_sigterm():
+        first, stream = _peek(frames)
+        return _write(target, suffix, _checked(stream, first.shape), first, fps, ffmpeg)
+
+
+def check_path(path: str | os.PathLike[str]) -> str:
+    """The suffix of the format that a path stands for; empty for a folder of pictures.
+
+    Raises:
+        RenderError: No such format can be written.
+        FileError: It is a folder that holds other things than pictures.
+    """
+    text = os.fspath(path)
+    suffix = "" if text.endswith(("/", os.sep)) else Path(path).suffix.lower()
+    if suffix and suffix not in FORMATS:
+        raise RenderError(
+            f"'{text}' is no video format that can be written; use {', '.join(FORMATS)}, "
+            "or a folder (no suffix) for numbered png"
+        )
+    if not suffix:
+        check_folder(Path(path))
+    return suffix
+
+
+def _write(
+    target: Path,
+    suffix: str,
+    frames: Iterator[Frame],
+    first: Frame,
+    fps: float,
+    ffmpeg: FFmpeg | None,
+) -> Video:
+    height, width = first.shape[:2]
+    if ffmpeg is not None:
+        size = _size_for_h264(width, height)
+        with replacing(target) as temporary:
+            count = write_mp4(temporary, frames, (width, height), fps, ffmpeg)
+        return Video(target, count, *size, fps)
+    if not suffix:
+        with replacing_folder(target) as folder:
+            count = _in_background(lambda stream: write_pictures(folder, stream), frames)
+        return Video(target, count, width, height, fps)
+    # Imported late: an mp4 needs no Pillow.
+    from mjcartpole.media import animation  # noqa: PLC0415
+
+    gif = suffix == ".gif"
+    write = animation.write_gif if gif else animation.write_webp
+    shown = _shown_fps(fps, animation.GIF_MOST_FPS if gif else animation.WEBP_MOST_FPS, suffix)
+    with replacing(target) as temporary:
+        count = _in_background(lambda stream: write(temporary, stream, fps), frames)
+    return Video(target, count, width, height, shown)
+
+
+def _find_ffmpeg(target: Path) -> FFmpeg | None:
+    """Who encodes an mp4; a line in the log if that is not who was to be expected."""
+    ffmpeg, why = find_ffmpeg(), why_not_the_first()
+    if ffmpeg is None:
+        _log.warning("no mp4 (%s); writing '%s' instead", why, target.with_suffix(".gif"))
+    elif why:
+        _log.warning("%s; using '%s'", why, ffmpeg.program)
+    return ffmpeg
+
+
+def _size_for_h264(width: int, height: int) -> tuple[int, int]:
+    size = even((width, height))
+    if min(size) == 0:
+        raise RenderError(f"H.264 needs at least 2x2 pixels, not {width}x{height}")
+    if size != (width, height):
+        _log.warning(
+            "H.264 needs an even width and height: %dx%d is cut to %dx%d", width, height, *size
+        )
+    return size
+
+
+def _shown_fps(fps: float, most: int, suffix: str) -> float:
+    if fps > most:
+        _log.warning("%s shows at most %d frames per second: %g is thinned out", suffix, most, fps)
+    return min(fps, most)
 
 
 def _peek(frames: Iterable[Frame]) -> tuple[Frame, Iterator[Frame]]:
@@ -67,125 +171,83 @@ def _peek(frames: Iterable[Frame]) -> tuple[Frame, Iterator[Frame]]:
     first = next(stream, None)
     if first is None:
         raise RenderError("a video needs at least one frame; none came")
+    _check(first, 0, first.shape)
     return first, itertools.chain([first], stream)
 
 
 def _checked(frames: Iterator[Frame], shape: tuple[int, ...]) -> Iterator[Frame]:
     for index, frame in enumerate(frames):
-        if frame.ndim != 3 or frame.shape[2] != 3 or frame.dtype != np.uint8:
-            raise RenderError(
-                f"frame {index} is an array of shape {frame.shape} and {frame.dtype}; "
-                "needed are (height, width, 3) and uint8"
-            )
-        if frame.shape != shape:
-            raise RenderError(
-                f"frame {index} is {frame.shape[1]}x{frame.shape[0]} pixels, the first one "
-                f"{shape[1]}x{shape[0]}; all frames of a video have one size"
-            )
+        _check(frame, index, shape)
         yield frame
 
 
-def _write_mp4(path: Path, frames: Iterator[Frame], shape: tuple[int, ...], fps: int) -> int:
-    if len(shape) == 3 and (shape[0] % 2 or shape[1] % 2):
+def _check(frame: Frame, index: int, shape: tuple[int, ...]) -> None:
+    if frame.ndim != 3 or frame.shape[2] != 3 or frame.dtype != np.uint8 or not frame.size:
         raise RenderError(
-            f"H.264 needs an even width and height, not {shape[1]}x{shape[0]}; "
-            f"use {shape[1] + shape[1] % 2}x{shape[0] + shape[0] % 2}"
+            f"frame {index} is an array of shape {frame.shape} and {frame.dtype}; "
+            "needed are (height, width, 3) and uint8"
         )
-    count = 0
-    with _encoder(path, shape, fps) as pipe:
-        for frame in frames:
-            pipe.write(np.ascontiguousarray(frame).data)
-            count += 1
-    return count
+    if frame.shape != shape:
+        raise RenderError(
+            f"frame {index} is {frame.shape[1]}x{frame.shape[0]} pixels, the first one "
+            f"{shape[1]}x{shape[0]}; all frames of a video have one size"
+        )
+
+
+class _StoppedError(Exception):
+    """The frames have ended early."""
+
+
+def _in_background(write: Callable[[Iterator[Frame]], int], frames: Iterator[Frame]) -> int:
+    """Encode in a thread, while this one draws the next frame (OpenGL may need this one)."""
+    waiting: queue.Queue[Frame | _StoppedError | None] = queue.Queue(_FRAMES_AHEAD)
+    with ThreadPoolExecutor(1, "mjcartpole-video") as executor:
+        writing = executor.submit(write, _taken(waiting))
+        end: _StoppedError | None = _StoppedError()
+        try:
+            for frame in frames:
+                # A copy: whoever draws may use one array for all frames.
+                if not _put(waiting, frame.copy(), writing):
+                    break
+            end = None
+        finally:
+            _put(waiting, end, writing)
+    return writing.result()
+
+
+def _taken(waiting: "queue.Queue[Frame | _StoppedError | None]") -> Iterator[Frame]:
+    while (item := waiting.get()) is not None:
+        if isinstance(item, _StoppedError):
+            raise item
+        yield item
+
+
+def _put(
+    waiting: "queue.Queue[Frame | _StoppedError | None]",
+    item: Frame | _StoppedError | None,
+    writing: "Future[int]",
+) -> bool:
+    """Hand something to the encoder; False if that has ended."""
+    while not writing.done():
+        with contextlib.suppress(queue.Full):
+            waiting.put(item, timeout=0.1)
+            return True
+    return False
 
 
 @contextlib.contextmanager
-def _encoder(path: Path, shape: tuple[int, ...], fps: int) -> Iterator[IO[bytes]]:
-    """Yield ffmpeg's input; afterwards the file is complete, or ffmpeg is gone."""
-    with tempfile.TemporaryFile() as messages:
-        process = _start(_command(path, shape, fps), messages)
-        assert process.stdin is not None
-        try:
-            # ffmpeg closes its input when it fails; its exit code and message say why.
-            with contextlib.suppress(BrokenPipeError):
-                yield process.stdin
-        except BaseException:
-            process.kill()
-            raise
-        finally:
-            with contextlib.suppress(BrokenPipeError):
-                process.stdin.close()
-            process.wait()
-        if process.returncode != 0:
-            messages.seek(0)
-            raise RenderError(f"ffmpeg failed: {_last_line(messages.read())}")
+def _ended_by_sigterm() -> Iterator[None]:
+    """Have `kill` clean up as Ctrl-C does, where nobody else has a say in it."""
 
+    def stop(number: int, _: FrameType | None) -> NoReturn:
+        raise SystemExit(128 + number)
 
-def _start(command: list[str], messages: IO[bytes]) -> subprocess.Popen[bytes]:
+    main = threading.current_thread() is threading.main_thread()
+    if not main or signal.getsignal(signal.SIGTERM) is not signal.SIG_DFL:
+        yield
+        return
+    signal.signal(signal.SIGTERM, stop)
     try:
-        return subprocess.Popen(
-            command,
-            stdin=subprocess.PIPE,
-            stdout=subprocess.DEVNULL,
-            stderr=messages,
-            # Ctrl-C is for this process, which then ends ffmpeg itself.
-            start_new_session=True,
-        )
-    except OSError as error:
-        raise RenderError(f"ffmpeg cannot be run ('{command[0]}'): {error.strerror}") from error
-
-
-def _command(path: Path, shape: tuple[int, ...], fps: int) -> list[str]:
-    height, width = shape[:2]
-    source = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", str(fps)]
-    # The colours are converted and labelled as BT.709, so that players need not guess.
-    labels = "colorspace=bt709:color_primaries=bt709:color_trc=bt709:range=tv"
-    colours = [
-        "-vf",
-        f"scale=out_color_matrix=bt709:out_range=tv,format=yuv420p,setparams={labels}",
-    ]
-    codec = ["-c:v", "libx264", "-preset", "veryfast", "-crf", "18"]
-    # faststart: the index comes first, so that a browser can play before it has all.
-    target = ["-movflags", "+faststart", "-f", "mp4", str(path)]
-    quiet = ["-hide_banner", "-loglevel", "error", "-nostdin", "-y"]
-    return [_ffmpeg(), *quiet, *source, "-i", "-", "-an", *colours, *codec, *target]
-
-
-def _ffmpeg() -> str:
-    # Imported late: training without a video must not wait for it.
-    from imageio.plugins import ffmpeg  # noqa: PLC0415
-
-    try:
-        return str(ffmpeg.get_exe())  # type: ignore[no-untyped-call]
-    except RuntimeError as error:
-        raise RenderError(f"no ffmpeg was found: {error}; pip install 'imageio[ffmpeg]'") from error
-
-
-def _last_line(messages: bytes) -> str:
-    lines = messages.decode(errors="replace").strip().splitlines()
-    return lines[-1] if lines else "it gave no reason"
-
-
-def _write_gif(path: Path, frames: Iterator[Frame], fps: int) -> int:
-    from PIL import Image  # noqa: PLC0415
-
-    count = 0
-
-    def images() -> Iterator[Image.Image]:
-        nonlocal count
-        palette: Image.Image | None = None
-        for frame in frames:
-            count += 1
-            image = Image.fromarray(frame)
-            # The first frame's palette for all: no flicker, a smaller file, and one pass.
-            palette = palette or image.quantize(_GIF_COLOURS, dither=Image.Dither.NONE)
-            yield image.quantize(palette=palette, dither=Image.Dither.NONE)
-
-    stream = images()
-    duration = 10 * max(round(100 / fps), _SHORTEST_GIF_FRAME)
-    # Pillow closes a file that it opened only after some kinds of errors.
-    with path.open("wb") as file:
-        next(stream).save(
-            file, "GIF", save_all=True, append_images=stream, duration=duration, loop=0
-        )
-    return count
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)

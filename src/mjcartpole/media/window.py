@@ -1,11 +1,9 @@
 """A window that shows a cart-pole as it moves: MuJoCo's own viewer."""
 
 import logging
-import os
 import sys
 import threading
 import time
-import warnings
 from typing import Protocol
 
 import mujoco
@@ -14,6 +12,7 @@ import numpy.typing as npt
 
 from mjcartpole import task
 from mjcartpole.media.scene import DEFAULT_CAMERA
+from mjcartpole.media.trial import try_backend
 from mjcartpole.physics.model import CartPole
 
 _PATIENCE = 5.0
@@ -41,10 +40,10 @@ def open_window(cartpole: CartPole, camera: str = DEFAULT_CAMERA) -> Window:
         cartpole: What to show.
         camera: The camera that the window starts with; the viewer's own if there is no such one.
     """
-    if sys.platform == "linux" and not _has_screen():
-        return NoWindow("neither DISPLAY nor WAYLAND_DISPLAY is set")
-    if not _window_system_answers():
-        return NoWindow("the window system does not answer")
+    # MuJoCo's viewer ends the whole process where GLFW does not work. On macOS MuJoCo draws
+    # without GLFW, so that a trial would say nothing; its viewer refuses by itself there.
+    if sys.platform != "darwin" and not (trial := try_backend("glfw")).works:
+        return NoWindow(trial.reason)
     try:
         return ViewerWindow(cartpole, camera)
     except (RuntimeError, mujoco.FatalError, ImportError, OSError) as error:
@@ -110,16 +109,3 @@ class NoWindow:
 
     def close(self) -> None:
         """Do nothing."""
-
-
-def _has_screen() -> bool:
-    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
-
-
-def _window_system_answers() -> bool:
-    """Whether GLFW starts. MuJoCo's viewer ends the whole process where it does not."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        import glfw  # noqa: PLC0415 - it looks for a window system when imported
-
-        return bool(glfw.init())

@@ -7,18 +7,22 @@ there, the import itself fails. Physics needs no OpenGL: in that case mujoco is 
 import os
 import sys
 
-_VARIABLE = "MUJOCO_GL"
+_VARIABLE, _PLATFORM = "MUJOCO_GL", "PYOPENGL_PLATFORM"
 
 
 def _import_mujoco() -> None:
     if "mujoco" in sys.modules:
         return
+    platform = os.environ.get(_PLATFORM)
     try:
         import mujoco  # noqa: PLC0415
-    except (AttributeError, ImportError, RuntimeError, OSError):
+    except Exception:  # What is raised depends on which of OpenGL's libraries is missing.
         wanted = os.environ.get(_VARIABLE)
         if wanted is None:
             raise
+        # The failed import leaves a platform behind that is not there.
+        if platform is None:
+            os.environ.pop(_PLATFORM, None)
         os.environ[_VARIABLE] = "disable"
         try:
             import mujoco  # noqa: F401, PLC0415

@@ -24,7 +24,7 @@ from mjcartpole.physics.model import CartPole, load_model
 from mjcartpole.studies.seeds import ManyResult
 
 SEEDS, TABLE, AGGREGATE = "seeds.json", "seeds.csv", "aggregate.json"
-FILES: Final = (SEEDS, TABLE, AGGREGATE, runs.MODEL)
+FILES: Final = (SEEDS, TABLE, AGGREGATE, runs.MODEL, runs.VERSIONS)
 
 
 @dataclass(frozen=True)
@@ -79,6 +79,7 @@ def begin_seeds(
     Raises:
         FileError: The folder cannot be written.
     """
+    runs.write_versions(folder)
     write_whole(folder / runs.MODEL, cartpole.xml)
     about = {"preset": preset, "seeds": list(seeds), "config": dataclasses.asdict(config)}
     write_whole(folder / SEEDS, json.dumps(about, indent=2) + "\n")
@@ -122,8 +123,10 @@ def _csv(many: ManyResult) -> str:
 
 
 def _check_free(folder: Path, overwrite: bool) -> None:
-    content = {path.name for path in folder.iterdir()} if folder.is_dir() else set()
-    if not content - {runs.LOCK, runs.MODEL}:
+    content = runs.content_of(folder)
+    # Killed in its first moment: see runs.py.
+    killed = runs.VERSIONS in content and content <= {runs.MODEL, runs.VERSIONS}
+    if not content or killed:
         return
     if SEEDS not in content:
         raise RunError(

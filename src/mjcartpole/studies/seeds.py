@@ -6,6 +6,7 @@ import dataclasses
 import multiprocessing
 import os
 import signal
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from multiprocessing.synchronize import Event
@@ -202,7 +203,8 @@ class Crew:
 
     def _in_threads(self, stop: Callable[[], bool]) -> Iterator[SeedResult | None]:
         with concurrent.futures.ThreadPoolExecutor(self.workers) as pool:
-            yield from _as_they_come([pool.submit(_train_seed, job, stop) for job in self._jobs])
+            futures = {pool.submit(_train_seed, job, stop): job.config.seed for job in self._jobs}
+            yield from _as_they_come(futures)
 
     def _in_processes(self, stop: Callable[[], bool]) -> Iterator[SeedResult | None]:
         # A fresh interpreter each: nothing of OpenGL or threads is inherited.
@@ -211,23 +213,36 @@ class Crew:
         with concurrent.futures.ProcessPoolExecutor(
             self.workers, mp_context=spawn, initializer=_begin_worker, initargs=(stopped,)
         ) as pool:
-            futures = [pool.submit(_train_seed_in_worker, job) for job in self._jobs]
-            for found in _as_they_come(futures):
-                if stop():
-                    stopped.set()
-                yield found
+            futures = {
+                pool.submit(_train_seed_in_worker, job): job.config.seed for job in self._jobs
+            }
+            try:
+                for found in _as_they_come(futures):
+                    if stop():
+                        stopped.set()
+                    yield found
+            finally:
+                stopped.set()
 
 
 def _as_they_come(
-    futures: "list[concurrent.futures.Future[SeedResult]]",
+    futures: "dict[concurrent.futures.Future[SeedResult], int]",
 ) -> Iterator[SeedResult | None]:
     waiting = set(futures)
     while waiting:
         done, waiting = concurrent.futures.wait(
             waiting, timeout=0.1, return_when=concurrent.futures.FIRST_COMPLETED
         )
-        yield from (future.result() for future in done)
+        yield from (_result_of(future, futures[future]) for future in done)
         yield None
+
+
+def _result_of(future: "concurrent.futures.Future[SeedResult]", seed: int) -> SeedResult:
+    try:
+        return future.result()
+    except (concurrent.futures.BrokenExecutor, OSError) as error:
+        # A worker process was killed from outside, or there is no memory for one.
+        return SeedResult(seed, error=f"its process ended: {error}")
 
 
 _stopped: Event | None = None
@@ -238,6 +253,15 @@ def _begin_worker(stopped: Event) -> None:
     global _stopped  # noqa: PLW0603 - the pool has no other way to hand an event over
     _stopped = stopped
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    """A worker outlives a parent that was killed, and would keep its folders locked."""
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+    parent.join()
+    os._exit(1)
 
 
 def _train_seed_in_worker(job: _Job) -> SeedResult:

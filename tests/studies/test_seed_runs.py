@@ -1,0 +1,147 @@
+"""The folder of many seeds."""
+
+import json
+
+import pytest
+
+from mjcartpole.errors import FileError, RunError
+from mjcartpole.learning import runs
+from mjcartpole.learning.config import TrainConfig
+from mjcartpole.physics.model import load_model, same_model
+from mjcartpole.studies import seed_runs
+from mjcartpole.studies.seeds import Crew, ManyResult, SeedResult
+
+CONFIG = TrainConfig(episodes=5, backend="gym", seed=2)
+
+OURS = set(seed_runs.FILES) - {"versions.json"}
+
+
+def claim(folder, **options):
+    with seed_runs.claimed_seeds(folder, **options):
+        pass
+
+
+def train_in(folder, seeds=2, config=CONFIG, **options):
+    crew = Crew(config, seeds, load_model(), folder=folder, preset="article")
+    with seed_runs.claimed_seeds(folder, **options):
+        seed_runs.begin_seeds(folder, config, crew.seeds, load_model(), preset="article")
+        for _ in crew.run(lambda: False):
+            pass
+        seed_runs.write_seeds(folder, crew.result())
+    return crew.result()
+
+
+def names(folder):
+    return sorted(path.name for path in folder.iterdir() if path.name != "versions.json")
+
+
+def test_what_many_seeds_leave(tmp_path):
+    many = train_in(tmp_path / "many")
+    assert names(tmp_path / "many") == sorted([*OURS, "seed-2", "seed-3"])
+    for found in many.seeds:
+        folder = seed_runs.seed_folder(tmp_path / "many", found.seed)
+        assert runs.is_complete(folder)
+        run = runs.load_run(folder)
+        assert (run.config, run.preset) == (found.result.config, "article")
+        assert runs.read_summary(folder)["evaluation"] == found.evaluation
+
+
+def test_what_was_begun_comes_back(tmp_path):
+    train_in(tmp_path / "many", seeds=[8, 3])
+    with seed_runs.resumed_seeds(tmp_path / "many") as begun:
+        assert (begun.preset, begun.config, begun.seeds) == ("article", CONFIG, (8, 3))
+        assert same_model(begun.cartpole.model, load_model().model)
+        assert begun.cartpole.name == "cartpole"
+        with pytest.raises(RunError, match="in use by another training"):
+            claim(tmp_path / "many", overwrite=True)
+    assert not (tmp_path / "many" / runs.LOCK).exists()
+
+
+def test_the_table_and_the_figures(tmp_path):
+    many = ManyResult(
+        CONFIG,
+        (
+            SeedResult(2, {"mean": 480.5, "minimum": 300.0}),
+            SeedResult(3, error="it fell, over"),
+            SeedResult(4),
+            SeedResult(5, {"mean": 100.0, "minimum": 9.0}),
+        ),
+    )
+    seed_runs.write_seeds(tmp_path, many)
+    assert (tmp_path / seed_runs.TABLE).read_text().splitlines() == [
+        "seed,mean,minimum,failed",
+        "2,480.5,300.0,no",
+        "3,,,yes",
+        "4,,,no",
+        "5,100.0,9.0,no",
+    ]
+    figures = json.loads((tmp_path / seed_runs.AGGREGATE).read_text())
+    assert (figures["seeds"], figures["failed"]) == (4, {"3": "it fell, over"})
+    assert figures["greedy_return"]["mean"] == 290.25
+    assert figures["greedy_return"]["minimum"] == 100
+    assert figures["greedy_return"]["solved"] == 0.5
+
+
+def test_without_scores_there_are_no_figures(tmp_path):
+    seed_runs.write_seeds(tmp_path, ManyResult(CONFIG, (SeedResult(2, error="no"),)))
+    assert json.loads((tmp_path / seed_runs.AGGREGATE).read_text())["greedy_return"] is None
+
+
+def test_seeds_that_are_there_need_overwrite_and_then_go(tmp_path):
+    folder = tmp_path / "many"
+    train_in(folder, seeds=4)
+    with pytest.raises(RunError, match=r"exists; .* go on with --resume .*, or .* --overwrite"):
+        claim(folder)
+    train_in(folder, seeds=[3], overwrite=True)
+    assert names(folder) == sorted([*OURS, "seed-3"])
+
+
+def test_overwriting_removes_nothing_that_is_not_ours(tmp_path):
+    folder = tmp_path / "many"
+    train_in(folder)
+    (folder / "notes.txt").write_text("mine")
+    (folder / "seed-2" / "notes.txt").write_text("mine")
+    (folder / "seed-9").mkdir()
+    claim(folder, overwrite=True)
+    assert (folder / "notes.txt").read_text() == "mine"
+    assert [path.name for path in (folder / "seed-2").iterdir()] == ["notes.txt"]
+    assert (folder / "seed-9").is_dir()
+
+
+@pytest.mark.parametrize("overwrite", [False, True])
+@pytest.mark.parametrize("names", [["thesis.tex"], ["model.xml"], ["config.json"], ["seed-0"]])
+def test_files_of_somebody_else_are_never_taken(names, overwrite, tmp_path):
+    for name in names:
+        (tmp_path / name).write_text("years of work")
+    with pytest.raises(RunError, match="holds other files"):
+        claim(tmp_path, overwrite=overwrite)
+    assert sorted(path.name for path in tmp_path.iterdir()) == names
+
+
+@pytest.mark.parametrize("left", [runs.LOCK, ".seeds-0123abcd.json", ".model-0123abcd.xml"])
+def test_what_a_kill_in_the_first_moment_leaves_is_no_obstacle(left, tmp_path):
+    (tmp_path / left).write_text("")
+    train_in(tmp_path)
+    assert names(tmp_path) == sorted([*OURS, "seed-2", "seed-3"])
+
+
+def test_an_empty_folder_goes_again_if_nothing_came_of_it(tmp_path):
+    claim(tmp_path / "deep" / "many")
+    assert not (tmp_path / "deep" / "many").exists()
+
+
+def test_a_file_in_the_way(tmp_path):
+    (tmp_path / "many").write_text("")
+    with pytest.raises(FileError):
+        claim(tmp_path / "many")
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", "{}", '{"seeds": [1], "config": {"gamma": 9}}'])
+def test_damaged_seeds_are_refused(text, tmp_path):
+    train_in(tmp_path)
+    (tmp_path / seed_runs.SEEDS).write_text(text)
+    with (
+        pytest.raises(RunError, match="does not name the seeds of a run, or is damaged"),
+        seed_runs.resumed_seeds(tmp_path),
+    ):
+        pass

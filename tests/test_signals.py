@@ -1,0 +1,80 @@
+"""Ctrl-C and SIGTERM."""
+
+import os
+import signal
+import threading
+
+import pytest
+
+from mjcartpole.signals import EXIT_CODES, Interrupted, StopSignals
+
+BOTH = pytest.mark.parametrize("number", list(EXIT_CODES))
+
+
+def send(number):
+    os.kill(os.getpid(), number)
+
+
+@BOTH
+def test_a_signal_raises_and_names_its_exit_code(number):
+    signals = StopSignals()
+    with signals.caught(), pytest.raises(Interrupted) as stopped:
+        send(number)
+    assert stopped.value.exit_code == 128 + number == EXIT_CODES[number]
+    assert str(stopped.value) == "interrupted"
+    assert isinstance(stopped.value, KeyboardInterrupt)
+    assert signals.stop()
+    assert signals.number == number
+
+
+@BOTH
+def test_a_deferred_signal_is_only_noted(number):
+    signals = StopSignals()
+    with signals.caught():
+        with signals.deferred():
+            assert not signals.stop()
+            send(number)
+            assert signals.stop()
+        assert signals.number == number
+
+
+@BOTH
+def test_a_second_signal_raises_even_then(number):
+    signals = StopSignals()
+    with signals.caught(), pytest.raises(Interrupted) as stopped, signals.deferred():
+        send(signal.SIGINT)
+        send(number)
+    assert stopped.value.exit_code == 128 + number
+
+
+def test_after_something_was_finished_a_signal_raises_again():
+    signals = StopSignals()
+    with signals.caught():
+        with signals.deferred():
+            pass
+        with pytest.raises(Interrupted):
+            send(signal.SIGTERM)
+
+
+def test_the_handlers_that_were_there_come_back():
+    before = [signal.getsignal(number) for number in EXIT_CODES]
+    signals = StopSignals()
+    with pytest.raises(RuntimeError), signals.caught():
+        assert [signal.getsignal(number) for number in EXIT_CODES] != before
+        raise RuntimeError
+    assert [signal.getsignal(number) for number in EXIT_CODES] == before
+
+
+def test_another_thread_leaves_the_signals_alone():
+    before, seen = [signal.getsignal(number) for number in EXIT_CODES], []
+
+    def work():
+        signals = StopSignals()
+        with signals.caught(), signals.deferred():
+            seen.append([signal.getsignal(number) for number in EXIT_CODES])
+            seen.append(signals.stop())
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    thread.join()
+    assert seen == [before, False]
