@@ -31,7 +31,8 @@ from mjcartpole.learning import runs
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.training import Training, train
 from mjcartpole.physics.model import load_model
-from mjcartpole.studies.seeds import available_cores, train_many
+from mjcartpole.studies.many import train_many
+from mjcartpole.studies.seeds import available_cores
 
 Section = Callable[[bool], Iterator[Ratio]]
 

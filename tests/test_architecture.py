@@ -115,8 +115,10 @@ def test_public_names():
     assert sorted(mjcartpole.__all__) == [
         "CartPole",
         "CartPoleEnv",
+        "CartPoleVectorEnv",
         "ENV_ID",
         "Evaluation",
+        "ManyResult",
         "Policy",
         "Simulation",
         "TrainConfig",
@@ -125,6 +127,7 @@ def test_public_names():
         "load_model",
         "model_names",
         "train",
+        "train_many",
     ]
     for name in mjcartpole.__all__:
         assert getattr(mjcartpole, name) is not None

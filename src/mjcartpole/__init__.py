@@ -18,12 +18,15 @@ from mjcartpole.envs.registration import ENV_ID, register
 
 if TYPE_CHECKING:
     from mjcartpole.envs.cartpole import CartPoleEnv
+    from mjcartpole.envs.vector import CartPoleVectorEnv
     from mjcartpole.learning.config import TrainConfig
     from mjcartpole.learning.policy import Policy
     from mjcartpole.learning.training import TrainResult, train
     from mjcartpole.physics.model import CartPole, load_model, model_names
     from mjcartpole.physics.simulation import Simulation
     from mjcartpole.studies.evaluation import Evaluation, evaluate
+    from mjcartpole.studies.many import train_many
+    from mjcartpole.studies.seeds import ManyResult
 
 __version__ = "0.1.0"
 
@@ -31,7 +34,9 @@ __all__ = [
     "ENV_ID",
     "CartPole",
     "CartPoleEnv",
+    "CartPoleVectorEnv",
     "Evaluation",
+    "ManyResult",
     "Policy",
     "Simulation",
     "TrainConfig",
@@ -40,12 +45,15 @@ __all__ = [
     "load_model",
     "model_names",
     "train",
+    "train_many",
 ]
 
 _HOMES = {
     "CartPole": "physics.model",
     "CartPoleEnv": "envs.cartpole",
+    "CartPoleVectorEnv": "envs.vector",
     "Evaluation": "studies.evaluation",
+    "ManyResult": "studies.seeds",
     "Policy": "learning.policy",
     "Simulation": "physics.simulation",
     "TrainConfig": "learning.config",
@@ -54,6 +62,7 @@ _HOMES = {
     "load_model": "physics.model",
     "model_names": "physics.model",
     "train": "learning.training",
+    "train_many": "studies.many",
 }
 
 register()

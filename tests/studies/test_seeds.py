@@ -10,7 +10,8 @@ from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.training import train
 from mjcartpole.physics.model import load_model
 from mjcartpole.studies.evaluation import evaluate
-from mjcartpole.studies.seeds import Crew, available_cores, train_many
+from mjcartpole.studies.many import train_many
+from mjcartpole.studies.seeds import Crew, available_cores
 
 CONFIG = TrainConfig(episodes=15, backend="gym", seed=4)
 

@@ -94,39 +94,6 @@ class _Job:
     events: bool
 
 
-def train_many(
-    config: TrainConfig,
-    seeds: int | Sequence[int],
-    *,
-    workers: int | None = None,
-    engine: Engine = "compiled",
-) -> ManyResult:
-    """Train one config with many seeds at once; nothing is written.
-
-    >>> many = train_many(TrainConfig(episodes=5, backend="gym"), seeds=3, workers=2)
-    >>> [found.seed for found in many.seeds]
-    [0, 1, 2]
-    >>> many.aggregate().count
-    3
-
-    Args:
-        config: What to train.
-        seeds: Which seeds; a number stands for that many from the config's own seed on.
-        workers: How many at once; as many as there are cores if left out. The compiled engine runs
-            in threads, since it leaves Python's lock alone, and the Python engine in processes.
-        engine: Who runs the loop.
-
-    Raises:
-        ConfigError: The seeds or workers make no sense.
-        ModelError: The model cannot be used.
-    """
-    cartpole = load_model(config.model)
-    crew = Crew(config, seeds, cartpole, workers=workers, engine=engine)
-    for _ in crew.run(lambda: False):
-        pass
-    return crew.result()
-
-
 class Crew:
     """Many seeds at work; iterating `run()` does it, `result()` says what it has come to.
 
