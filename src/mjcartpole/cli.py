@@ -11,139 +11,27 @@ import json
 import logging
 import os
 import sys
-from collections.abc import Sequence
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Annotated, Any, Literal, NoReturn
+from collections.abc import Callable, Sequence
+from typing import Annotated, Any, NoReturn
 
 import tyro
 
 from mjcartpole import __version__
-from mjcartpole.envs.backend import Backend
 from mjcartpole.errors import ConfigError, MjCartPoleError
-from mjcartpole.integrator import Integrator
+from mjcartpole.flags import (
+    Command,
+    Doctor,
+    Evaluate,
+    Model,
+    Parity,
+    Played,
+    Render,
+    Train,
+)
 from mjcartpole.learning.config import TrainConfig
-from mjcartpole.learning.engine import Engine
-from mjcartpole.studies.evaluation import EPISODES
 
 INTERRUPTED = 130
-COMMANDS = ("train", "evaluate", "render", "parity", "doctor")
-
-
-Against = Literal["cartpole-v1", "itself"]
-Quality = Literal["draft", "normal", "high"]
-
-
-@dataclass(frozen=True)
-class Train:
-    """Train a Q-table, evaluate it, and film it."""
-
-    config: Annotated[TrainConfig, tyro.conf.arg(name=""), tyro.conf.OmitArgPrefixes]
-    preset: str = "tuned"
-    """Where the defaults below come from: tuned, article or article-terminal."""
-    run_dir: Path | None = None
-    """Folder for the run; runs/<preset>-<backend>-seed<seed> if left out."""
-    video: bool = True
-    """Film the first evaluation episode into videos/<run's name>.mp4."""
-    overwrite: bool = False
-    """Replace the run that --run-dir holds."""
-    resume: Path | None = None
-    """Continue the training of this run folder, or from a checkpoint in it, as it began."""
-    engine: Engine = "compiled"
-    """Who runs the loop; both give the same bits."""
-    seeds: int = 1
-    """Train this many seeds from --seed on, side by side, and print statistics over them."""
-    workers: int | None = None
-    """How many seeds at once; as many as there are cores if left out."""
-    checkpoint_every: float = 30.0
-    """Seconds between two checkpoints."""
-    tensorboard: bool = False
-    """Write the learning curve as TensorBoard events into the run folder."""
-
-
-@dataclass(frozen=True)
-class _Played:
-    """What evaluating and filming have in common: where a policy is played."""
-
-    backend: Backend | None = None
-    """Who does the physics; the run's own if left out."""
-    model: str | None = None
-    """Model to play on; the run's own if left out."""
-    integrator: Integrator | None = None
-    """The run's own if left out."""
-    seed: int | None = None
-    """Seeds the starting states; the same as after training if left out."""
-
-
-@dataclass(frozen=True)
-class Evaluate(_Played):
-    """Play greedy episodes from fresh starting states, and count."""
-
-    source: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="RUN-OR-POLICY")] = (
-        tyro.MISSING
-    )
-    """A run folder or a policy file."""
-    episodes: int = EPISODES
-    """How many."""
-    json: bool = False
-    """Print JSON."""
-
-
-@dataclass(frozen=True)
-class Render(_Played):
-    """Film greedy episodes, the first that an evaluation with the same seed plays."""
-
-    sources: Annotated[
-        tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="RUN-OR-POLICY …")
-    ] = tyro.MISSING
-    """Run folders or policy files; several are shown side by side, from the same start."""
-    output: Annotated[Path | None, tyro.conf.arg(aliases=["-o"])] = None
-    """An .mp4, .gif or .webp, or a folder for pictures; videos/<name>.mp4 if left out."""
-    episodes: int = 1
-    """How many, one after the other."""
-    camera: str = "side"
-    """A camera of the model."""
-    size: str = "640x480"
-    """Pixels, width x height, of each run's picture."""
-    quality: Quality = "normal"
-    """draft is quick, high is fine, normal is what the model's file says."""
-    overlay: bool = False
-    """Write step, return, state, action and action values into the picture."""
-    speed: float = 1.0
-    """0.25 is four times slower than the motion."""
-    fps: float = 50.0
-    """Frames per second."""
-    fall: bool = False
-    """Show the last second of each episode alone, four times slower."""
-    sheet: bool = False
-    """Write equally spaced frames as one .png instead of a video."""
-
-
-@dataclass(frozen=True)
-class Parity:
-    """Hold MuJoCo against CartPole-v1, rung by rung."""
-
-    model: str = "cartpole"
-    """A shipped model's name or an MJCF file."""
-    against: Against = "cartpole-v1"
-    """cartpole-v1: is this model CartPole-v1? itself: does MuJoCo move it as its equations do?"""
-    rungs: tuple[int, ...] = tuple(range(1, 11))
-    """Which rungs of the ladder."""
-    quick: bool = False
-    """Fewer samples."""
-    json: Path | None = None
-    """Write every figure to this file."""
-
-
-@dataclass(frozen=True)
-class Doctor:
-    """Say what was found here: versions, OpenGL, encoders, and what to install."""
-
-    json: bool = False
-    """Print JSON."""
-
-
-Command = Train | Evaluate | Render | Parity | Doctor
+COMMANDS = ("train", "evaluate", "render", "parity", "doctor", "model")
 
 
 class UsageError(MjCartPoleError):
@@ -173,37 +61,56 @@ def _run(argv: list[str]) -> int:
         return 0
     command = parse(argv or ["--help"])
     _report_to_stderr()
-    match command:
-        case Train():
-            return _train(command)
-        case Doctor():
-            return _examine(command)
-    from mjcartpole import commands  # noqa: PLC0415 - it imports MuJoCo
+    calls: dict[type, Callable[[Any], int]] = {
+        Train: _train,
+        Evaluate: _evaluate,
+        Render: _render,
+        Parity: _parity,
+        Doctor: _examine,
+        Model: _model,
+    }
+    return calls[type(command)](command)
 
-    match command:
-        case Evaluate():
-            return commands.run_evaluate(
-                command.source,
-                commands.Choice(**_choice(command)),
-                episodes=command.episodes,
-                as_json=command.json,
-            )
-        case Render():
-            return _render(command)
-        case Parity():
-            from mjcartpole import parity_command  # noqa: PLC0415 - it imports SciPy
 
-            return parity_command.run_parity(
-                command.model,
-                against=command.against,
-                rungs=command.rungs,
-                quick=command.quick,
-                output=command.json,
-            )
+# Each imports what it needs, since that imports MuJoCo, SciPy or Numba.
+
+
+def _evaluate(command: Evaluate) -> int:
+    from mjcartpole import commands  # noqa: PLC0415
+
+    choice = commands.Choice(**_choice(command))
+    return commands.run_evaluate(
+        command.source, choice, episodes=command.episodes, as_json=command.json
+    )
+
+
+def _parity(command: Parity) -> int:
+    from mjcartpole import parity_command  # noqa: PLC0415
+
+    return parity_command.run_parity(
+        command.model,
+        command.set,
+        against=command.against,
+        rungs=command.rungs,
+        quick=command.quick,
+        output=command.json,
+    )
+
+
+def _model(command: Model) -> int:
+    from mjcartpole import model_command  # noqa: PLC0415
+
+    match command.action:
+        case "list":
+            return model_command.run_list()
+        case "show":
+            return model_command.run_show(command.name, command.set)
+        case "edit":
+            return model_command.run_edit(command.name, command.set, command.output)
 
 
 def _examine(command: Doctor) -> int:
-    from mjcartpole.media import doctor  # noqa: PLC0415 - it imports MuJoCo
+    from mjcartpole.media import doctor  # noqa: PLC0415
 
     report = doctor.examine()
     print(json.dumps(report.as_dict(), indent=2) if command.json else report.text())
@@ -211,7 +118,7 @@ def _examine(command: Doctor) -> int:
 
 
 def _train(command: Train) -> int:
-    from mjcartpole import train_command  # noqa: PLC0415 - it imports MuJoCo
+    from mjcartpole import train_command  # noqa: PLC0415
 
     how = train_command.How(
         engine=command.engine,
@@ -232,7 +139,7 @@ def _train(command: Train) -> int:
 
 
 def _render(command: Render) -> int:
-    from mjcartpole import commands, render_command  # noqa: PLC0415 - they import MuJoCo
+    from mjcartpole import commands, render_command  # noqa: PLC0415
     from mjcartpole.studies.film import Look  # noqa: PLC0415
 
     if not command.sources:
@@ -296,8 +203,10 @@ def _report_to_stderr() -> None:
         log.propagate = False
 
 
-def _choice(command: _Played) -> dict[str, Any]:
-    return {name: getattr(command, name) for name in ("backend", "model", "integrator", "seed")}
+def _choice(command: Played) -> dict[str, Any]:
+    return {
+        name: getattr(command, name) for name in ("backend", "model", "integrator", "seed", "set")
+    }
 
 
 def parse(argv: Sequence[str]) -> Command:
@@ -308,6 +217,7 @@ def parse(argv: Sequence[str]) -> Command:
         UsageError: A word of it is not understood.
         SystemExit: With code 0, after `--help`.
     """
+    argv = _gather_edits(argv)
     preset = _preset_in(argv)
     train_default = Train(config=TrainConfig.preset(preset), preset=preset)
     grammar = (
@@ -316,6 +226,7 @@ def parse(argv: Sequence[str]) -> Command:
         | Annotated[Render, tyro.conf.subcommand("render")]
         | Annotated[Parity, tyro.conf.subcommand("parity")]
         | Annotated[Doctor, tyro.conf.subcommand("doctor")]
+        | Annotated[Model, tyro.conf.subcommand("model")]
     )
     complaint = io.StringIO()
     try:
@@ -334,6 +245,21 @@ def parse(argv: Sequence[str]) -> Command:
             f"{_one_line(complaint.getvalue())}; see mjcartpole{command_name} --help"
         ) from None
     return command
+
+
+def _gather_edits(argv: Sequence[str]) -> list[str]:
+    """One --set with all edits, wherever and however often they were given."""
+    words, edits, follows = [], list[str](), False
+    for word in argv:
+        if word == "--set" or word.startswith("--set="):
+            edits += [word.removeprefix("--set=")] if "=" in word else []
+            follows = True
+        elif follows and "=" in word and not word.startswith("-"):
+            edits.append(word)
+        else:
+            follows = False
+            words.append(word)
+    return [*words, "--set", *edits] if edits else words
 
 
 def _preset_in(argv: Sequence[str]) -> str:

@@ -4,10 +4,11 @@ import json
 from dataclasses import dataclass
 from pathlib import Path
 
-from mjcartpole.envs.backend import Backend
+from mjcartpole.envs.backend import Backend, check_backend
 from mjcartpole.integrator import Integrator
 from mjcartpole.learning import runs
 from mjcartpole.learning.policy import Policy
+from mjcartpole.physics.model import load_model
 from mjcartpole.physics.simulation import silence_mujoco
 from mjcartpole.studies import evaluation
 from mjcartpole.studies.evaluation import Evaluation, check_count, evaluate
@@ -25,6 +26,7 @@ class Choice:
     model: str | None = None
     integrator: Integrator | None = None
     seed: int | None = None
+    set: tuple[str, ...] = ()
 
 
 def run_evaluate(source: Path, choice: Choice, *, episodes: int, as_json: bool) -> int:
@@ -32,7 +34,8 @@ def run_evaluate(source: Path, choice: Choice, *, episodes: int, as_json: bool) 
     stage = set_stage(source, choice)
     result = _evaluate(stage, episodes)
     if as_json:
-        print(json.dumps({"policy": str(source), "model": str(stage.model), **result.summary()}))
+        model = stage.model if isinstance(stage.model, str) else stage.cartpole.name
+        print(json.dumps({"policy": str(source), "model": model, **result.summary()}))
     else:
         print_evaluation(result)
     return 0
@@ -57,9 +60,10 @@ def set_stage(source: Path, choice: Choice) -> Stage:
     if backend == "gym":
         # Gymnasium's cart-pole has neither; only what the user asks for is held against that.
         integrator, model = "gym", "cartpole"
-    return Stage(
-        name, policy, backend, choice.model or model, choice.integrator or integrator, seed
-    )
+    model, integrator = choice.model or model, choice.integrator or integrator
+    check_backend(backend, model, integrator, choice.set)
+    played_on = load_model(model, choice.set) if choice.set else model
+    return Stage(name, policy, backend, played_on, integrator, seed)
 
 
 def _evaluate(stage: Stage, episodes: int) -> Evaluation:

@@ -23,12 +23,18 @@ VERDICTS = {"holds": "holds", "fails": "FAILS", "beyond": "BEYOND", "skipped": "
 
 
 def run_parity(
-    model: str, *, against: Against, rungs: Sequence[int], quick: bool, output: Path | None
+    model: str,
+    edits: Sequence[str] = (),
+    *,
+    against: Against,
+    rungs: Sequence[int],
+    quick: bool,
+    output: Path | None,
 ) -> int:
     """Climb the ladder and print each rung as it is found. Returns the exit code."""
     silence_mujoco()
     check_rungs(rungs)
-    cartpole = load_model(model, own_timestep=True)
+    cartpole = load_model(model, edits, own_timestep=True)
     subject = Subject(cartpole, against, quick)
     # A model whose parameters cannot be read is the user's mistake: better known before any work.
     _ = subject.causes

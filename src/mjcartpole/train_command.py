@@ -162,7 +162,7 @@ def _prepare(config: TrainConfig, how: How) -> CartPole:
     """Check all that can be checked before a folder is touched; returns the model."""
     silence_mujoco()
     _check(how)
-    cartpole = load_model(config.model)
+    cartpole = load_model(config.model, config.set)
     runs.check_storable(cartpole)
     return cartpole
 

@@ -78,14 +78,6 @@ def test_pole_and_cart_are_not_covered(cartpole, size, camera):
     assert (plain[pole] == frame[pole]).all() or slack
 
 
-def test_a_hanging_pole_has_the_strip_above():
-    hanging = DOCUMENT.replace('pos="0 0 0.5" mass', 'pos="0 0 -0.5" mass').replace(
-        'fromto="0 0 0 0 0 1"', 'fromto="0 0 0 0 0 -1"'
-    )
-    _, frame, _ = draw(load_model(hanging), moment())
-    assert (frame[5, :5] == PAPER).all()
-
-
 def test_without_action_and_values_there_is_neither_arrow_nor_bar(cartpole):
     _, frame, _ = draw(cartpole, moment(action=None, values=None))
     assert not len(arrow_pixels(frame, 480)[0])

@@ -1,5 +1,6 @@
 """Who does the physics: our MuJoCo cart-pole or gymnasium's CartPole-v1, behind one interface."""
 
+from collections.abc import Collection
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import gymnasium
@@ -16,7 +17,9 @@ Backend = Literal["mujoco", "gym"]
 GYM_ID = "CartPole-v1"
 
 
-def check_backend(backend: str, model: object, integrator: str) -> None:
+def check_backend(
+    backend: str, model: object, integrator: str, edits: Collection[str] = ()
+) -> None:
     """Refuse a backend that does not exist, or settings that it would ignore.
 
     Raises:
@@ -27,10 +30,11 @@ def check_backend(backend: str, model: object, integrator: str) -> None:
             f"backend '{backend}' is unknown; available: {', '.join(get_args(Backend))}"
         )
     check_integrator(integrator)
-    if backend == "gym" and (model, integrator) != ("cartpole", "gym"):
+    if backend == "gym" and ((model, integrator) != ("cartpole", "gym") or edits):
+        asked = ", ".join(f"'{word}'" for word in (model, integrator, *edits))
         raise ConfigError(
-            f"backend 'gym' is gymnasium's {GYM_ID} as it is: it takes no model or integrator "
-            f"(asked for '{model}', '{integrator}'); use backend 'mujoco' for these"
+            f"backend 'gym' is gymnasium's {GYM_ID} as it is: it takes no model, integrator or "
+            f"edits (asked for {asked}); use backend 'mujoco' for these"
         )
 
 

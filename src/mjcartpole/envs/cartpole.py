@@ -17,8 +17,9 @@ from mjcartpole.integrator import Integrator
 from mjcartpole.media.renderer import DEFAULT_HEIGHT, DEFAULT_WIDTH, Renderer, open_renderer
 from mjcartpole.media.scene import DEFAULT_CAMERA, check_picture
 from mjcartpole.media.window import Window, open_window
-from mjcartpole.physics.model import ModelLike, load_model
+from mjcartpole.physics.model import Edits, ModelLike, load_model
 from mjcartpole.physics.simulation import (
+    FARTHEST_SANE,
     Simulation,
     State,
     check_sane,
@@ -29,6 +30,7 @@ RenderMode = Literal["human", "rgb_array"]
 # What `step` needs, as plain globals: the fewest look-ups and no sign to change.
 _INT64 = np.int64
 _X_MIN, _X_MAX = -task.X_LIMIT, task.X_LIMIT
+_FARTHEST = FARTHEST_SANE
 _THETA_MIN, _THETA_MAX = -task.THETA_LIMIT, task.THETA_LIMIT
 
 _DEFAULT_PICTURE = {"width": DEFAULT_WIDTH, "height": DEFAULT_HEIGHT, "camera": DEFAULT_CAMERA}
@@ -109,6 +111,7 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int]):
     | Parameter             | Type                   | Default     | Description                   |
     |-----------------------|------------------------|-------------|-------------------------------|
     | `model`               | str, path, MjSpec      | "cartpole"  | A shipped model's name, an MJCF file, an XML document, or an MjSpec |
+    | `edits`               | dict                   | None        | Edits of the model, such as `{"pole.length": 1.5}` |
     | `integrator`          | "gym" or "mujoco"      | "gym"       | Explicit Euler as CartPole-v1, or the integrator that the file names |
     | `sutton_barto_reward` | bool                   | False       | See Rewards                   |
     | `render_mode`         | None, "rgb_array", "human" | None    | Nothing, arrays, or a window (where there is a screen) |
@@ -136,6 +139,7 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int]):
         self,
         *,
         model: ModelLike = "cartpole",
+        edits: Edits = None,
         integrator: Integrator = "gym",
         sutton_barto_reward: bool = False,
         render_mode: RenderMode | None = None,
@@ -156,7 +160,7 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int]):
         self.observation_space = spaces.Box(-bound, bound, dtype=np.float32)
         self.action_space = spaces.Discrete(task.N_ACTIONS)
         self.render_mode = render_mode
-        self.simulation = Simulation(load_model(model), integrator)
+        self.simulation = Simulation(load_model(model, edits), integrator)
         self._advance: Callable[[float], State] = _needs_reset
         self._left, self._right = self.simulation.cartpole.controls
         self._step_reward, self._end_reward, self._late_reward = (
@@ -215,9 +219,8 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int]):
         if (
             _X_MIN <= x <= _X_MAX
             and _THETA_MIN <= theta <= _THETA_MAX
-            # Neither velocity is NaN or infinite. A finite one that is too large shows in the
-            # position, one step later.
-            and (x_dot - theta_dot) * 0.0 == 0.0
+            # Neither velocity is NaN, or so large that the physics have diverged.
+            and -_FARTHEST < x_dot - theta_dot < _FARTHEST
         ):
             terminated, reward = False, self._step_reward
         else:

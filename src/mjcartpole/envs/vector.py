@@ -22,7 +22,7 @@ from mjcartpole.errors import ConfigError, InvalidActionError, ResetNeededError
 from mjcartpole.integrator import Integrator, check_integrator
 from mjcartpole.media.renderer import DEFAULT_HEIGHT, DEFAULT_WIDTH, Renderer, open_renderer
 from mjcartpole.media.scene import DEFAULT_CAMERA, check_picture
-from mjcartpole.physics.model import ModelLike, load_model
+from mjcartpole.physics.model import Edits, ModelLike, load_model
 from mjcartpole.physics.simulation import LARGEST_SANE, check_sane, stepping_model
 
 VectorRenderMode = Literal["rgb_array"]
@@ -82,6 +82,7 @@ class CartPoleVectorEnv(
     | `num_envs`            | int                    | 1           | How many environments         |
     | `max_episode_steps`   | int                    | 500         | Steps until truncation        |
     | `model`               | str, path, MjSpec      | "cartpole"  | As in `CartPoleEnv`           |
+    | `edits`               | dict                   | None        | Edits of the model, such as `{"pole.length": 1.5}` |
     | `integrator`          | "gym" or "mujoco"      | "gym"       | As in `CartPoleEnv`           |
     | `sutton_barto_reward` | bool                   | False       | 0 per step and -1 at termination, instead of 1 per step |
     | `threads`             | int or None            | None        | Threads that step; None: one per core |
@@ -113,6 +114,7 @@ class CartPoleVectorEnv(
         *,
         max_episode_steps: int = task.TIME_LIMIT,
         model: ModelLike = "cartpole",
+        edits: Edits = None,
         integrator: Integrator = "gym",
         sutton_barto_reward: bool = False,
         threads: int | None = None,
@@ -134,7 +136,7 @@ class CartPoleVectorEnv(
         check_integrator(integrator)
         _check_render_mode(render_mode)
         self.render_mode = render_mode
-        self.cartpole = load_model(model)
+        self.cartpole = load_model(model, edits)
         if render_mode is not None or (width, height, camera) != _DEFAULT_PICTURE:
             check_picture(self.cartpole, width, height, camera)
         bound = task.observation_bound()

@@ -54,6 +54,8 @@ class TrainConfig:
     """Who does the physics: mujoco, or gymnasium's own CartPole-v1."""
     model: str = "cartpole"
     """A shipped model's name or an MJCF file; backend mujoco only."""
+    set: tuple[str, ...] = ()
+    """Edits of the model, such as pole.length=1.5 or joint:hinge.damping=0.1."""
     integrator: Integrator = "gym"
     """gym: explicit Euler, as CartPole-v1; mujoco: the integrator that the model's file names."""
     episodes: int = 1_500
@@ -92,9 +94,9 @@ class TrainConfig:
     """Episodes per row of the printed table."""
 
     def __post_init__(self) -> None:
-        for name in ("bins", "low", "high"):
+        for name in ("bins", "low", "high", "set"):
             object.__setattr__(self, name, tuple(getattr(self, name)))
-        check_backend(self.backend, self.model, self.integrator)
+        check_backend(self.backend, self.model, self.integrator, self.set)
         self._check_counts()
         self._check_numbers()
         if len(self.bins) != len(DIMENSIONS):

@@ -29,7 +29,7 @@ from mjcartpole.learning.discretizer import Grid
 from mjcartpole.learning.episodes import Columns
 from mjcartpole.learning.qlearning import Table
 from mjcartpole.physics import cartpole_v1
-from mjcartpole.physics.simulation import LARGEST_SANE, State
+from mjcartpole.physics.simulation import FARTHEST_SANE, LARGEST_SANE, State
 
 DIVERGED: Final = -1
 """In place of an ending."""
@@ -206,10 +206,11 @@ def _observe(state: State) -> State:
 
 @compiled
 def _is_over(state: State) -> bool:
-    """Whether the rules end the episode, or a NaN or infinity does, as in the environment."""
+    """Whether the rules end the episode, or a state gone wild does, as in the environment."""
     x, x_dot, theta, theta_dot = state
-    finite = (x - theta) * 0.0 == 0.0 and (x_dot - theta_dot) * 0.0 == 0.0
-    return _has_terminated(x, theta) or not finite
+    is_number = (x - theta) * 0.0 == 0.0
+    is_sane = -FARTHEST_SANE < x_dot - theta_dot < FARTHEST_SANE
+    return _has_terminated(x, theta) or not is_number or not is_sane
 
 
 @compiled

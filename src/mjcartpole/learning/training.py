@@ -121,7 +121,7 @@ class Training:
         if config.backend == "gym":
             cartpole = None
         elif cartpole is None:
-            cartpole = load_model(config.model)
+            cartpole = load_model(config.model, config.set)
         physics = (config.backend, cartpole or config.model, config.integrator)
         self.engine = choose_engine(engine, config.backend, cartpole)
         if self.engine == "compiled":

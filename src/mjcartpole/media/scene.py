@@ -20,6 +20,7 @@ from mjcartpole.media.fan import Fan, Wedge, box_corners
 from mjcartpole.media.quality import DEFAULT_QUALITY, Quality, level_of
 from mjcartpole.media.view import Points, View
 from mjcartpole.physics.model import CartPole
+from mjcartpole.physics.structure import directions
 
 Box = tuple[int, int, int, int]
 """Left, top, right, bottom, in pixels; right and bottom lie just outside."""
@@ -37,6 +38,8 @@ LARGEST: Final = 8192
 _EXTRA_GEOMS: Final = 1000
 _TRIANGLE: Final = mujoco.mjtGeom.mjGEOM_TRIANGLE
 _ONES: Final = np.ones(3)
+_STRAIGHT: Final = 0.999
+"""Share of a look that is up or down, beyond which its azimuth means nothing."""
 
 
 class Scene:
@@ -74,7 +77,7 @@ class Scene:
         self.model.vis.global_.offwidth = self.width * self.level.enlargement
         self.model.vis.global_.offheight = self.height * self.level.enlargement
         self.level.prepare(self.model)
-        self._camera = _find_camera(self.model, cartpole.name, camera, self.width / self.height)
+        self._camera = _find_camera(cartpole, camera, self.width / self.height)
         self._data = mujoco.MjData(self.model)
         self._option = mujoco.MjvOption()
         self.abstract = mujoco.MjvScene(self.model, self.model.ngeom + _EXTRA_GEOMS)
@@ -198,7 +201,7 @@ def check_picture(cartpole: CartPole, width: int, height: int, camera: str) -> N
         RenderError: The size makes no sense, or the model has no such camera.
     """
     size = _pixels("width", width) / _pixels("height", height)
-    _find_camera(cartpole.model, cartpole.name, camera, size)
+    _find_camera(cartpole, camera, size)
 
 
 def _pixels(name: str, value: int) -> int:
@@ -214,27 +217,33 @@ def _pixels(name: str, value: int) -> int:
     return pixels
 
 
-def _find_camera(
-    model: mujoco.MjModel, model_name: str, name: str, aspect: float
-) -> mujoco.MjvCamera:
+def _find_camera(cartpole: CartPole, name: str, aspect: float) -> mujoco.MjvCamera:
+    model = cartpole.model
     names = [model.camera(index).name for index in range(model.ncam)]
     camera = mujoco.MjvCamera()
     if name in names:
         camera.type = mujoco.mjtCamera.mjCAMERA_FIXED
         camera.fixedcamid = names.index(name)
         return camera
-    if not names and name in (DEFAULT_CAMERA, FREE_CAMERA):
-        _frame_track(camera, model, aspect)
+    if name in (DEFAULT_CAMERA, FREE_CAMERA):
+        _frame_track(camera, cartpole, aspect)
         return camera
-    available = ", ".join(label or "(unnamed)" for label in names) or FREE_CAMERA
-    raise RenderError(f"{model_name} has no camera {name!r}; available: {available}")
+    available = ", ".join(label for label in [*names, FREE_CAMERA] if label)
+    raise RenderError(f"{cartpole.name} has no camera {name!r}; available: {available}")
 
 
-def _frame_track(camera: mujoco.MjvCamera, model: mujoco.MjModel, aspect: float) -> None:
-    """Look along +y from where the whole track fits into the picture, x to the right."""
+def _frame_track(camera: mujoco.MjvCamera, cartpole: CartPole, aspect: float) -> None:
+    """Look from where the whole track fits into the picture, +x to the right, up to the top."""
+    model, towards = cartpole.model, directions(cartpole)
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    up, forward = towards.up, np.cross(towards.up, towards.rail)
     camera.type = mujoco.mjtCamera.mjCAMERA_FREE
-    camera.lookat[:] = 0.0, 0.0, 0.5
-    camera.azimuth, camera.elevation = 90.0, 0.0
+    camera.lookat[:] = data.xpos[model.jnt_bodyid[cartpole.slider]] + 0.5 * up
+    camera.elevation = np.degrees(np.arcsin(np.clip(forward[2], -1.0, 1.0)))
+    # Looking straight down or up, the azimuth says where the top of the picture is.
+    across = forward if abs(forward[2]) < _STRAIGHT else -np.sign(forward[2]) * up
+    camera.azimuth = np.degrees(np.arctan2(across[1], across[0]))
     half_view = aspect * np.tan(np.radians(model.vis.global_.fovy) / 2)
     camera.distance = 1.2 * task.X_LIMIT / half_view
 

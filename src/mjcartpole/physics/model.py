@@ -8,16 +8,26 @@ import copy
 import dataclasses
 import difflib
 import os
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeAlias
-from xml.etree import ElementTree
 
 import mujoco
 import numpy as np
 
 from mjcartpole import task
-from mjcartpole.errors import ModelNotFoundError, ModelSyntaxError, NotACartPoleError
+from mjcartpole.errors import ConfigError, ModelNotFoundError, ModelSyntaxError
+from mjcartpole.physics.reading import read_text, stand_alone
+from mjcartpole.physics.soundness import check_motion, check_numbers
+from mjcartpole.physics.structure import (
+    check_directions,
+    check_limits,
+    count_from_upright,
+    find_controls,
+    find_joints,
+    find_substeps,
+)
 
 INTEGRATORS = ("Euler", "RK4", "implicit", "implicitfast")
 """As MJCF spells them, in the order of MuJoCo's mjtIntegrator."""
@@ -35,6 +45,8 @@ class CartPole:
         hinge: Index of the pole's joint in qpos and qvel.
         controls: The actuator's control for action 0 and for action 1.
         substeps: Physics steps per control step of 0.02 s.
+        upright: The hinge's angle as the document counts it at which the model's angle is 0, rad.
+            It is 0 but where a document has the pole hang, or lie, at its own angle 0.
     """
 
     name: str
@@ -44,6 +56,7 @@ class CartPole:
     hinge: int
     controls: tuple[float, float]
     substeps: int
+    upright: float = 0.0
 
     @property
     def timestep(self) -> float:
@@ -58,6 +71,10 @@ class CartPole:
 
 ModelLike: TypeAlias = str | os.PathLike[str] | mujoco.MjSpec | CartPole
 """What `load_model` takes: a name, a path, an XML document, an MjSpec, or a loaded cart-pole."""
+
+
+Edits: TypeAlias = Mapping[str, object] | Sequence[str] | None
+"""Changes of a document: a mapping, or texts such as "pole.length=1.5"."""
 
 
 def models_folder() -> Path:
@@ -75,13 +92,20 @@ def model_names() -> list[str]:
     return sorted(path.stem for path in models_folder().glob("*.xml"))
 
 
-def load_model(source: ModelLike = "cartpole", *, own_timestep: bool = False) -> CartPole:
+def load_model(
+    source: ModelLike = "cartpole", edits: Edits = None, *, own_timestep: bool = False
+) -> CartPole:
     """Load a cart-pole.
+
+    >>> load_model("cartpole", {"pole.length": 1.5}).name
+    'cartpole with pole.length=1.5'
 
     Args:
         source: The name of a shipped model (`"cartpole"`), the path of an MJCF file, an MJCF
             document as text (it starts with `<`), or an `mujoco.MjSpec`. A loaded cart-pole is
             returned as it is.
+        edits: Changes of the document, made before it is compiled (see `edit_document`): a
+            mapping, or texts such as "pole.length=1.5".
         own_timestep: Let a control step be one physics step of the file, however long, instead of
             as many as fill CartPole-v1's 0.02 s.
 
@@ -89,17 +113,36 @@ def load_model(source: ModelLike = "cartpole", *, own_timestep: bool = False) ->
         ModelNotFoundError: There is no such name or file.
         ModelSyntaxError: MuJoCo does not accept the document.
         NotACartPoleError: It compiles, but is no cart-pole.
+        ConfigError: An edit makes no sense.
     """
+    if edits:
+        return _load_edited(source, edits, own_timestep)
     if isinstance(source, CartPole):
         return source
     if isinstance(source, mujoco.MjSpec):
         return _find_parts(*_from_spec(source), own_timestep)
     if isinstance(source, str) and source.lstrip().startswith("<"):
         name = "the XML document"
-        return _find_parts(name, source, _compile(source, name), own_timestep)
+        return _find_parts(name, *_from_text(source, name), own_timestep)
     path = find_model(source)
     name = path.stem if path.parent == models_folder() else str(source)
     return _find_parts(name, *_from_file(path), own_timestep)
+
+
+def _load_edited(
+    source: ModelLike, edits: Mapping[str, object] | Sequence[str], own_timestep: bool
+) -> CartPole:
+    from mjcartpole.physics.edit import edit_document, edits_of  # noqa: PLC0415 - it needs CartPole
+
+    if isinstance(source, mujoco.MjSpec):
+        raise ConfigError("edits change a document; an MjSpec is changed by its own attributes")
+    # An edit may be what makes a file's timestep fit.
+    base = load_model(source, own_timestep=True)
+    changes = edits_of(edits)
+    document = edit_document(base.xml, changes)
+    what = ", ".join(f"{key}={value}" for key, value in changes.items())
+    name = f"{base.name} with {what}"
+    return _find_parts(name, *_from_text(document, name), own_timestep)
 
 
 def with_options(
@@ -154,12 +197,14 @@ def find_model(source: str | os.PathLike[str]) -> Path:
 
 def _from_file(path: Path) -> tuple[str, mujoco.MjModel]:
     """The document, whole, and the compiled model."""
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise ModelNotFoundError(f"model file '{path}' cannot be read: {error}") from error
-    model = _compile(text, str(path), path)
-    return self_contained(text, path.parent), model
+    xml = stand_alone(read_text(path), str(path), path.parent)
+    return xml, _compile(xml, str(path), path)
+
+
+def _from_text(text: str, name: str) -> tuple[str, mujoco.MjModel]:
+    """The document, whole, and the compiled model; includes are sought where the program runs."""
+    xml = stand_alone(text, name, Path())
+    return xml, _compile(xml, name)
 
 
 def _from_spec(spec: mujoco.MjSpec) -> tuple[str, str, mujoco.MjModel]:
@@ -204,101 +249,21 @@ def self_contained(text: str, folder: Path) -> str:
     A document without includes is returned as it is, to the last character.
 
     Raises:
-        ModelSyntaxError: MuJoCo is lenient, but with includes the files must be well-formed XML.
+        ModelError: The document or an included file cannot be read.
     """
-    if "<include" not in text:
-        return text
-    parser = ElementTree.XMLParser(target=ElementTree.TreeBuilder(insert_comments=True))
-    try:
-        root = ElementTree.fromstring(text, parser)
-        _expand_includes(root, folder)
-    except (ElementTree.ParseError, OSError) as error:
-        raise ModelSyntaxError(f"the includes cannot be put together: {error}") from error
-    return ElementTree.tostring(root, encoding="unicode")
-
-
-def _expand_includes(parent: ElementTree.Element, folder: Path) -> None:
-    for index, child in reversed(list(enumerate(parent))):
-        if child.tag == "include":
-            included = ElementTree.parse(folder / child.get("file", "")).getroot()
-            _expand_includes(included, folder)
-            parent[index : index + 1] = list(included)
-        else:
-            _expand_includes(child, folder)
+    return stand_alone(text, "the XML document", folder)
 
 
 def _find_parts(name: str, xml: str, model: mujoco.MjModel, own_timestep: bool) -> CartPole:
-    slider = _only_joint(name, model, mujoco.mjtJoint.mjJNT_SLIDE, "slide", "the cart's")
-    hinge = _only_joint(name, model, mujoco.mjtJoint.mjJNT_HINGE, "hinge", "the pole's")
-    if model.njnt != 2:
-        raise _no_cart_pole(name, model, "a joint that is neither the cart's nor the pole's")
-    if not _is_below(model, model.jnt_bodyid[hinge], model.jnt_bodyid[slider]):
-        raise _no_cart_pole(name, model, "a hinge whose body is not inside the cart's body")
-    return CartPole(
-        name=name,
-        xml=xml,
-        model=model,
-        slider=slider,
-        hinge=hinge,
-        controls=_controls(name, model, slider),
-        substeps=1 if own_timestep else _substeps(name, model),
-    )
-
-
-def _only_joint(
-    name: str, model: mujoco.MjModel, kind: mujoco.mjtJoint, word: str, whose: str
-) -> int:
-    """Index of the only joint of a kind; slide and hinge joints have one coordinate each."""
-    found = [index for index in range(model.njnt) if model.jnt_type[index] == kind]
-    if len(found) != 1:
-        amount = f"{len(found)} {word} joints" if found else f"no {word} joint"
-        raise _no_cart_pole(name, model, f"{amount} where one ({whose}) is needed")
-    return found[0]
-
-
-def _is_below(model: mujoco.MjModel, body: int, ancestor: int) -> bool:
-    while body not in (0, ancestor):
-        body = model.body_parentid[body]
-    return bool(body == ancestor)
-
-
-def _controls(name: str, model: mujoco.MjModel, slider: int) -> tuple[float, float]:
-    """Controls of the two actions: the ends of the actuator's range, or -1 and 1 without one."""
-    if model.nu != 1 or model.na != 0:
-        amount = f"{model.nu} actuators" if model.nu else "no actuator"
-        stateful = " with activation states" if model.na else ""
-        raise _no_cart_pole(name, model, f"{amount}{stateful} where one plain motor is needed")
-    joint_transmissions = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
-    pushes_joint = int(model.actuator_trntype[0]) in joint_transmissions
-    if not pushes_joint or model.actuator_trnid[0, 0] != slider:
-        raise _no_cart_pole(name, model, "an actuator that does not push along the slide joint")
-    if not model.actuator_ctrllimited[0]:
-        return -1.0, 1.0
-    low, high = model.actuator_ctrlrange[0]
-    return float(low), float(high)
-
-
-def _substeps(name: str, model: mujoco.MjModel) -> int:
-    timestep = float(model.opt.timestep)
-    substeps = round(task.CONTROL_STEP / timestep)
-    if substeps < 1 or abs(substeps * timestep - task.CONTROL_STEP) > 1e-12:
-        raise NotACartPoleError(
-            f"{name}: timestep {timestep:g} s does not divide the control step of "
-            f"{task.CONTROL_STEP} s; use 0.02, 0.01, 0.005, 0.002 …"
-        )
-    return substeps
-
-
-def _no_cart_pole(name: str, model: mujoco.MjModel, found: str) -> NotACartPoleError:
-    kinds = [mujoco.mjtJoint(int(kind)).name for kind in model.jnt_type]
-    joints = [
-        f"{model.joint(index).name or 'unnamed'} ({kind.removeprefix('mjJNT_').lower()})"
-        for index, kind in enumerate(kinds)
-    ]
-    actuators = [model.actuator(index).name or "unnamed" for index in range(model.nu)]
-    return NotACartPoleError(
-        f"{name} is not a cart-pole: it has {found} "
-        f"[joints: {', '.join(joints) or 'none'}; actuators: {', '.join(actuators) or 'none'}]; "
-        "needed are a slide joint for the cart, one hinge joint inside it, and one motor on the "
-        "slide joint"
-    )
+    check_numbers(name, model)
+    slider, hinge = find_joints(name, model)
+    controls = find_controls(name, model, slider)
+    substeps = 1 if own_timestep else find_substeps(name, model)
+    cartpole = CartPole(name, xml, model, slider, hinge, controls, substeps)
+    upright = check_directions(name, cartpole).upright
+    if abs(upright) > task.THETA_LIMIT:
+        upright = count_from_upright(name, cartpole, upright)
+        cartpole = dataclasses.replace(cartpole, upright=upright)
+    check_limits(name, cartpole)
+    check_motion(name, cartpole)
+    return cartpole

@@ -17,6 +17,9 @@ State = tuple[float, float, float, float]
 LARGEST_SANE: float = mujoco.mjMAXVAL
 """MuJoCo calls a coordinate beyond this bad (1e10)."""
 
+FARTHEST_SANE: float = 2 * LARGEST_SANE
+"""Two values that differ by more are not both sane."""
+
 
 class Simulation:
     """One cart-pole in motion.

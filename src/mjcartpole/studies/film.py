@@ -30,12 +30,20 @@ from mjcartpole.media.scene import DEFAULT_CAMERA, check_picture
 from mjcartpole.media.strip import Moment
 from mjcartpole.media.video import DEFAULT_FPS
 from mjcartpole.physics.model import CartPole, ModelLike, load_model
-from mjcartpole.studies.evaluation import SEED
+from mjcartpole.studies.evaluation import SEED, check_count
 from mjcartpole.task import CONTROL_STEP, N_ACTIONS
 
 FALL_SECONDS: Final = 1.0
 """How much of an episode's end a film of its fall shows."""
 FALL_SPEED: Final = 0.25
+
+LEAST_FPS: Final = 1
+MOST_FPS: Final = 1_000
+LEAST_SPEED: Final = 0.001
+MOST_SPEED: Final = 1_000
+
+_ROUNDING: Final = 1e-6
+"""More than what a place can be off by, in control steps."""
 
 Frame = npt.NDArray[np.uint8]
 
@@ -97,9 +105,15 @@ class Look:
             RenderError: See above.
         """
         check_picture(cartpole, self.width, self.height, self.camera)
-        if not 0 < self.fps <= 1_000:
-            raise RenderError(f"fps {self.fps:g} makes no sense; use 1 to 1000, such as 50")
-        self.places(2)
+        if not LEAST_FPS <= self.fps <= MOST_FPS:
+            raise RenderError(
+                f"fps {self.fps:g} makes no sense; use {LEAST_FPS} to {MOST_FPS}, such as 50"
+            )
+        if not LEAST_SPEED <= self.speed <= MOST_SPEED:
+            raise RenderError(
+                f"speed {self.speed:g} makes no sense; use {LEAST_SPEED} to {MOST_SPEED}: "
+                "0.25 is four times slower, 1 as it was"
+            )
 
     def places(self, states: int) -> npt.NDArray[np.float64]:
         """Where in an episode of so many states each frame lies, in control steps."""
@@ -126,7 +140,7 @@ class Take:
 
     def moment(self, place: float) -> Moment:
         """What an overlay says at a place between control steps."""
-        step, policy = int(place), self.stage.policy
+        step, policy = int(place + _ROUNDING), self.stage.policy
         state = state_at(self.states, place)
         if step >= self.episode.steps:
             return Moment(self.episode.steps, self.episode.total, state)
@@ -140,18 +154,16 @@ def play(stage: Stage, episodes: int = 1) -> list[Take]:
     """Play the first episodes that an evaluation with the same seed plays.
 
     Raises:
-        RenderError: There is no episode to be played.
+        ConfigError: There is no episode to be played, or the seed is negative.
         SimulationError: The physics diverged.
     """
-    if episodes < 1:
-        raise RenderError(f"{episodes} episodes cannot be filmed; use 1 or more")
-    env = make_env(stage.backend, stage.model, stage.integrator)
+    check_count(episodes, stage.seed)
     takes = []
-    for number in range(episodes):
-        seed = stage.seed if number == 0 else None
-        episode, states = play_episode(env, stage.policy, number=number, seed=seed)
-        takes.append(Take(stage, episode, np.array(states)))
-    env.close()
+    with contextlib.closing(make_env(stage.backend, stage.model, stage.integrator)) as env:
+        for number in range(episodes):
+            seed = stage.seed if number == 0 else None
+            episode, states = play_episode(env, stage.policy, number=number, seed=seed)
+            takes.append(Take(stage, episode, np.array(states)))
     return takes
 
 
@@ -167,7 +179,8 @@ class Film:
         """Open a renderer for each stage; several are shown side by side.
 
         Args:
-            casts: The takes of each stage, one after the other in time.
+            casts: The takes of each stage, as many of each, one after the other in time: each
+                starts when all that are shown beside the one before have ended.
             look: How it looks.
 
         Raises:
@@ -175,20 +188,16 @@ class Film:
         """
         self._casts = casts
         self._look = look
-        self._renderers: list[Renderer] = []
-        self._open = contextlib.ExitStack()
-        for takes in casts:
-            cartpole = takes[0].stage.cartpole
-            look.check(cartpole)
-            renderer = open_renderer(
-                cartpole,
-                width=look.width,
-                height=look.height,
-                camera=look.camera,
-                quality=look.quality,
-            )
-            self._renderers.append(self._open.enter_context(contextlib.closing(renderer)))
-        self.length = max(sum(len(look.places(len(t.states))) for t in takes) for takes in casts)
+        with contextlib.ExitStack() as opened:
+            self._renderers = [
+                opened.enter_context(_open_renderer(takes[0].stage.cartpole, look))
+                for takes in casts
+            ]
+            self._open = opened.pop_all()
+        self.length = sum(
+            max(len(look.places(len(take.states))) for take in takes)
+            for takes in zip(*casts, strict=True)
+        )
         self.drawn_by: str = self._renderers[0].kind
 
     def __enter__(self) -> "Film":
@@ -199,13 +208,10 @@ class Film:
 
     def frames(self) -> Iterator[Frame]:
         """Draw it, one frame at a time; an array may be used again for the next one."""
-        streams = [
-            self._draw(takes, renderer)
-            for takes, renderer in zip(self._casts, self._renderers, strict=True)
-        ]
-        if len(streams) == 1:
-            return streams[0]
-        return side_by_side(streams, [takes[0].stage.name for takes in self._casts])
+        labels = [takes[0].stage.name for takes in self._casts]
+        for takes in zip(*self._casts, strict=True):
+            streams = [self._draw(*pair) for pair in zip(takes, self._renderers, strict=True)]
+            yield from streams[0] if len(streams) == 1 else side_by_side(streams, labels)
 
     def contact_sheet(self, count: int) -> Frame:
         """Equally spaced moments of the first stage's first episode, as one picture."""
@@ -215,9 +221,8 @@ class Film:
         frames = [frame.copy() for frame in self._draw_places(take, renderer, chosen)]
         return sheet(frames, [time_label(place) for place in chosen])
 
-    def _draw(self, takes: Sequence[Take], renderer: Renderer) -> Iterator[Frame]:
-        for take in takes:
-            yield from self._draw_places(take, renderer, self._look.places(len(take.states)))
+    def _draw(self, take: Take, renderer: Renderer) -> Iterator[Frame]:
+        return self._draw_places(take, renderer, self._look.places(len(take.states)))
 
     def _draw_places(
         self, take: Take, renderer: Renderer, places: Sequence[float] | npt.NDArray[np.float64]
@@ -226,3 +231,10 @@ class Film:
         for place in places:
             frame = renderer.render(state_at(take.states, place))
             yield frame if overlay is None else overlay.draw(frame, take.moment(place))
+
+
+def _open_renderer(cartpole: CartPole, look: Look) -> Renderer:
+    look.check(cartpole)
+    return open_renderer(
+        cartpole, width=look.width, height=look.height, camera=look.camera, quality=look.quality
+    )

@@ -43,7 +43,7 @@ def train_many(
         ModelError: The model cannot be used.
         FileError: The folder is taken or cannot be written.
     """
-    cartpole = load_model(config.model)
+    cartpole = load_model(config.model, config.set)
     if run_dir is None:
         crew = Crew(config, seeds, cartpole, workers=workers, engine=engine)
         return _finished(crew, crew.run(_never))

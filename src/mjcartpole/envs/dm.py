@@ -1,0 +1,218 @@
+"""CartPole-v1 with MuJoCo underneath, as a `dm_env.Environment` built on dm_control.
+
+Nothing else of this package imports dm_control, which takes a second or two.
+"""
+
+import collections
+import copy
+import math
+import operator
+import warnings
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+from gymnasium.utils import seeding
+
+from mjcartpole import task
+from mjcartpole.errors import ConfigError
+from mjcartpole.physics.model import CartPole, Edits, ModelLike, load_model
+
+try:
+    with warnings.catch_warnings():
+        # It looks for a window system on import, and warns where there is none.
+        warnings.simplefilter("ignore")
+        from dm_control import mujoco
+        from dm_control.mujoco import wrapper
+        from dm_control.rl import control
+        from dm_env import specs  # type: ignore[import-untyped]
+except Exception as error:
+    _why = " ".join(f"{type(error).__name__}: {error}".split())
+    raise ImportError(
+        f"mjcartpole.envs.dm needs dm_control, which does not load: {_why}"
+    ) from error
+
+TASKS: Final = ("balance",)
+TIME_LIMIT: Final = task.TIME_LIMIT * task.CONTROL_STEP
+"""Seconds."""
+
+
+class Physics(mujoco.Physics):  # type: ignore[misc]
+    """dm_control's physics, with readings that have names."""
+
+    cartpole: CartPole
+
+    @classmethod
+    def of(cls, cartpole: CartPole) -> "Physics":
+        """Physics of a cart-pole; whatever is changed in its model stays there."""
+        physics: Physics = cls.from_model(wrapper.MjModel(copy.copy(cartpole.model)))
+        physics.cartpole = cartpole
+        return physics
+
+    def after_reset(self) -> None:
+        """Bring all that follows from the state up to date; an episode has no past."""
+        super().after_reset()
+        # The solver would begin its first step from here, and end at other bits.
+        self.data.qacc_warmstart[:] = 0
+
+    @property
+    def state(self) -> npt.NDArray[np.float64]:
+        """The state `(x, x_dot, theta, theta_dot)`, shape (4,), a copy; m, m/s, rad, rad/s."""
+        slider, hinge = self.cartpole.slider, self.cartpole.hinge
+        qpos, qvel = self.data.qpos, self.data.qvel
+        return np.array([qpos[slider], qvel[slider], qpos[hinge], qvel[hinge]])
+
+    def put(self, state: npt.NDArray[np.float64]) -> None:
+        """Put the cart-pole into a state, shape (4,); inside `reset_context`."""
+        slider, hinge = self.cartpole.slider, self.cartpole.hinge
+        self.data.qpos[[slider, hinge]] = state[[0, 2]]
+        self.data.qvel[[slider, hinge]] = state[[1, 3]]
+
+    def cart_position(self) -> float:
+        """Where the cart is, m."""
+        return float(self.data.qpos[self.cartpole.slider])
+
+    def pole_angle(self) -> float:
+        """How far the pole leans to +x, rad."""
+        return float(self.data.qpos[self.cartpole.hinge])
+
+
+class Balance(control.Task):  # type: ignore[misc]
+    """CartPole-v1's rules as a dm_control task.
+
+    - Action: the actuator's control, shape (1,), between those of CartPole-v1's two actions: for
+      the reference model -1 to 1, which its gear makes -10 to 10 N, as in dm_control's suite. What
+      lies outside counts as the nearer end. With `discrete`, it is CartPole-v1's own: 0 pushes to
+      the left, 1 to the right.
+    - Observation: an OrderedDict of `position`, `(x, theta)`, and `velocity`, `(x_dot, theta_dot)`,
+      each of shape (2,), float64.
+    - Reward 1 for every step, the last one included. Discount 0 where the pole leans more than 12
+      degrees or the cart is more than 2.4 m from the middle, 1 elsewhere, the time limit included.
+    - Each of the four state values starts uniformly within ±0.05. A seed gives the starting
+      states that the gymnasium environment has after `reset(seed=...)` and further resets.
+
+    Attributes:
+        random: Draws the starting states.
+        steps: Control steps of this episode.
+    """
+
+    def __init__(
+        self, cartpole: CartPole, *, random: np.random.Generator, limit: float, discrete: bool
+    ) -> None:
+        """Take what decides an episode.
+
+        Args:
+            cartpole: What moves.
+            random: Draws the starting states.
+            limit: Control steps until an episode is cut off.
+            discrete: Whether actions are 0 and 1, instead of controls.
+        """
+        self.random = random
+        self.steps = 0
+        self._controls = cartpole.controls
+        self._limit = limit
+        self._discrete = discrete
+
+    def initialize_episode(self, physics: Physics) -> None:
+        """Draw a starting state."""
+        low, high = task.RESET_LOW, task.RESET_HIGH
+        physics.put(self.random.uniform(low=low, high=high, size=(4,)))
+        self.steps = 0
+
+    def action_spec(self, physics: Physics) -> specs.BoundedArray:
+        """What actions look like."""
+        if self._discrete:
+            return specs.DiscreteArray(task.N_ACTIONS, dtype=np.int64, name="action")
+        low, high = sorted(self._controls)
+        return specs.BoundedArray((1,), np.float64, low, high, name="action")
+
+    def before_step(self, action: npt.ArrayLike, physics: Physics) -> None:
+        """Push.
+
+        Raises:
+            ConfigError: A discrete action is neither 0 nor 1, or another is no finite number.
+        """
+        physics.set_control([self._control(np.asarray(action))])
+
+    def after_step(self, physics: Physics) -> None:
+        """Count."""
+        self.steps += 1
+
+    def get_observation(
+        self, physics: Physics
+    ) -> "collections.OrderedDict[str, npt.NDArray[np.float64]]":
+        """The state, positions and velocities apart."""
+        state = physics.state
+        return collections.OrderedDict(position=state[[0, 2]], velocity=state[[1, 3]])
+
+    def get_reward(self, physics: Physics) -> float:
+        """1 for every step."""
+        return 1.0
+
+    def get_termination(self, physics: Physics) -> float | None:
+        """Discount of the step that ends an episode; None while it goes on."""
+        if task.has_terminated(physics.cart_position(), physics.pole_angle()):
+            return 0.0
+        return 1.0 if self.steps >= self._limit else None
+
+    def _control(self, action: npt.NDArray[Any]) -> float:
+        if self._discrete:
+            try:
+                return self._controls[(0, 1).index(operator.index(action.item()))]
+            except (TypeError, ValueError):
+                raise ConfigError(f"{action!r} is no action; the actions are 0 and 1") from None
+        if action.size != 1 or not np.isfinite(action).all():
+            raise ConfigError(f"an action is one finite control, shape (1,), not {action!r}")
+        low, high = sorted(self._controls)
+        return min(max(float(action.item()), low), high)
+
+
+def load(
+    task_name: str = "balance",
+    *,
+    model: ModelLike = "cartpole",
+    edits: Edits = None,
+    seed: int | None = None,
+    discrete: bool = False,
+    time_limit: float = TIME_LIMIT,
+    environment_kwargs: dict[str, Any] | None = None,
+) -> control.Environment:
+    """Make CartPole-v1 as a dm_control environment; see `Balance` for its rules.
+
+    The integrator is the one that the model's file names, as everywhere in dm_control: states are
+    those of `mj_step`, and of the gymnasium environment with `integrator="mujoco"`, bit for bit.
+
+    >>> env = load("balance", seed=0)
+    >>> env.reset().observation["position"].round(4)
+    array([ 0.0137, -0.0459])
+    >>> env.step(env.action_spec().maximum).reward
+    1.0
+
+    Args:
+        task_name: `balance`.
+        model: See `load_model`.
+        edits: Changes of it; see `load_model`.
+        seed: Seeds the starting states; None draws one.
+        discrete: Take CartPole-v1's actions 0 and 1 instead of a control between their two.
+        time_limit: Seconds until an episode is cut off; `float("inf")` for never.
+        environment_kwargs: More for dm_control's `Environment`, such as `flat_observation`.
+
+    Raises:
+        ConfigError: There is no such task, or the seed or time limit makes no sense.
+        ModelError: The model cannot be used.
+    """
+    if task_name not in TASKS:
+        raise ConfigError(f"task {task_name!r} is unknown; available: {', '.join(TASKS)}")
+    if not time_limit > 0:
+        raise ConfigError(f"time_limit must be more than 0 seconds, not {time_limit}")
+    if seed is not None and seed < 0:
+        raise ConfigError(f"seed must be a whole number from 0 up, not {seed}")
+    cartpole = load_model(model, edits)
+    step = cartpole.timestep * cartpole.substeps
+    limit = time_limit if math.isinf(time_limit) else max(1, round(time_limit / step))
+    random, _ = seeding.np_random(seed)
+    balance = Balance(cartpole, random=random, limit=limit, discrete=discrete)
+    # Without dm_control's half steps, a step is one call of mj_step, whatever the solver.
+    settings = {"legacy_step": False, **(environment_kwargs or {})}
+    physics = Physics.of(cartpole)
+    return control.Environment(physics, balance, n_sub_steps=cartpole.substeps, **settings)

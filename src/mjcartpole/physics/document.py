@@ -1,0 +1,191 @@
+"""An MJCF as text that is edited in place: what is not edited stays as it was written.
+
+No XML writer keeps comments, quotes and the spaces between attributes, so nothing is written anew:
+expat says where each start tag begins, and an edit replaces or inserts bytes there. (lxml knows
+lines only, no columns.)
+"""
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Final
+from xml.parsers import expat
+from xml.sax.saxutils import escape
+
+from mjcartpole.errors import ModelSyntaxError
+
+_ATTRIBUTE: Final = re.compile(rb"""\s+([^\s=/>"']+)\s*=\s*("[^"]*"|'[^']*')""")
+
+
+@dataclass(eq=False)
+class Element:
+    """An element of a document.
+
+    Attributes:
+        tag: Its tag.
+        attributes: As they are in the document, entities resolved.
+        parent: The element around it; None for the root.
+        start: Where its `<` is, in bytes.
+        children: The elements in it, in order.
+    """
+
+    tag: str
+    attributes: dict[str, str]
+    parent: "Element | None"
+    start: int
+    children: list["Element"] = field(default_factory=list)
+
+    @property
+    def name(self) -> str:
+        """What a person calls it; default classes are called by their class, or main."""
+        if self.tag == "default":
+            return self.attributes.get("class", "main")
+        return self.attributes.get("name", "")
+
+    def walk(self) -> Iterator["Element"]:
+        """The element and all in it, in the order of the document."""
+        yield self
+        for child in self.children:
+            yield from child.walk()
+
+    def find(self, tag: str) -> "list[Element]":
+        """Its children of a tag; those inside a <frame> count as its own."""
+        found = []
+        for child in self.children:
+            if child.tag == tag:
+                found.append(child)
+            if child.tag == "frame":
+                found.extend(child.find(tag))
+        return found
+
+
+class Document:
+    """An MJCF text and its elements.
+
+    Attributes:
+        root: The outermost element.
+    """
+
+    root: Element
+
+    def __init__(self, text: str) -> None:
+        """Find the elements of a text.
+
+        Raises:
+            ModelSyntaxError: It is not well-formed XML, though MuJoCo may be lenient.
+        """
+        self._parse(text)
+
+    @property
+    def text(self) -> str:
+        """The document as it is now."""
+        return self._bytes.decode("utf-8")
+
+    def set(self, element: Element, name: str, value: str) -> None:
+        """Give an element an attribute; a value that is there already keeps its spelling.
+
+        Elements stay valid: their places move along.
+        """
+        if element.attributes.get(name) == value:
+            return
+        for match in self._attributes(element):
+            if match[1].decode() == name:
+                quote = match[2][:1].decode()
+                self._replace(*match.span(2), quote + _quoted(value, quote) + quote)
+                break
+        else:
+            end = self._attributes_end(element)
+            self._replace(end, end, f' {name}="{_quoted(value, chr(34))}"')
+        element.attributes[name] = value
+
+    def insert(self, parent: Element, tag: str) -> Element:
+        """Put a new, empty element first into another, on a line of its own where there is one."""
+        position = len(parent.children) and parent.children[0].start
+        end = self._tag_end(parent)
+        if self._bytes[end - 2 : end] == b"/>":
+            self._replace(end - 2, end, f"></{parent.tag}>")
+            end, new = end - 1, f"<{tag}/>"
+            self._replace(end, end, new)
+            start = end
+        else:
+            space = self._indentation(position) if position else ""
+            self._replace(end, end, f"{space}<{tag}/>")
+            start = end + len(space)
+        path = self._path(parent)
+        self._parse(self.text)
+        parent = self._follow(path)
+        return next(child for child in parent.children if child.start == start)
+
+    def _parse(self, text: str) -> None:
+        stack: list[Element] = []
+        parser = expat.ParserCreate()
+
+        def start(tag: str, attributes: dict[str, str]) -> None:
+            parent = stack[-1] if stack else None
+            element = Element(tag, attributes, parent, parser.CurrentByteIndex)
+            if parent is None:
+                self.root = element
+            else:
+                parent.children.append(element)
+            stack.append(element)
+
+        def entity(*_: object) -> None:
+            raise ModelSyntaxError("the document declares XML entities, which MuJoCo does not know")
+
+        parser.StartElementHandler = start
+        parser.EndElementHandler = lambda _: stack.pop()
+        parser.EntityDeclHandler = entity
+        try:
+            self._bytes = text.encode("utf-8")
+            parser.Parse(text, True)
+        except (expat.ExpatError, UnicodeEncodeError) as error:
+            raise ModelSyntaxError(
+                f"the document cannot be edited, it is not well-formed XML: {error}"
+            ) from error
+
+    def _attributes(self, element: Element) -> Iterator[re.Match[bytes]]:
+        position = element.start + 1 + len(element.tag.encode())
+        while match := _ATTRIBUTE.match(self._bytes, position):
+            yield match
+            position = match.end()
+
+    def _attributes_end(self, element: Element) -> int:
+        end = element.start + 1 + len(element.tag.encode())
+        for match in self._attributes(element):
+            end = match.end()
+        return end
+
+    def _tag_end(self, element: Element) -> int:
+        return self._bytes.index(b">", self._attributes_end(element)) + 1
+
+    def _indentation(self, position: int) -> str:
+        """The line break and the spaces before a place; nothing if something else precedes it."""
+        before = self._bytes[:position].decode("utf-8")
+        match = re.search(r"\r?\n[ \t]*$", before)
+        return match[0] if match else ""
+
+    def _replace(self, start: int, end: int, text: str) -> None:
+        new = text.encode("utf-8")
+        self._bytes = self._bytes[:start] + new + self._bytes[end:]
+        moved = len(new) - (end - start)
+        for element in self.root.walk():
+            if element.start >= end:
+                element.start += moved
+
+    def _path(self, element: Element) -> list[int]:
+        path: list[int] = []
+        while element.parent is not None:
+            siblings = element.parent.children
+            path.insert(0, next(i for i, other in enumerate(siblings) if other is element))
+            element = element.parent
+        return path
+
+    def _follow(self, path: list[int]) -> Element:
+        element = self.root
+        for index in path:
+            element = element.children[index]
+        return element
+
+
+def _quoted(value: str, quote: str) -> str:
+    return escape(value, {quote: "&quot;" if quote == '"' else "&apos;"})

@@ -1,0 +1,91 @@
+"""Numbers that no simulation survives are refused before anything is simulated with them."""
+
+import functools
+import itertools
+from typing import Any, Final
+
+import mujoco
+import numpy as np
+
+from mjcartpole import task
+from mjcartpole.errors import ModelError
+from mjcartpole.physics.structure import HasParts
+
+MOST_MEMORY: Final = 2**30
+"""Bytes that a model may ask for, for contacts and constraints."""
+
+MOST_ITERATIONS: Final = 10_000
+"""Of a solver, per step."""
+
+
+def check_numbers(name: str, model: mujoco.MjModel) -> None:
+    """Refuse numbers that no simulation survives, before anything is computed with them.
+
+    Raises:
+        ModelError: A number is NaN or infinite, or asks for endless work or memory.
+    """
+    if model.narena > MOST_MEMORY:
+        raise ModelError(
+            f"{name} asks for {model.narena / 2**20:.0f} MB of working memory; no more than "
+            f"{MOST_MEMORY / 2**20:.0f} MB are given: look at memory, njmax and nconmax of <size>"
+        )
+    for field in ("iterations", "ls_iterations", "noslip_iterations", "ccd_iterations"):
+        if getattr(model.opt, field) > MOST_ITERATIONS:
+            raise ModelError(
+                f"{name} asks for {getattr(model.opt, field)} {field} in each step; no more than "
+                f"{MOST_ITERATIONS} are done"
+            )
+    if not model.opt.timestep > 0:
+        raise ModelError(f"{name} has a timestep of {model.opt.timestep:g} s; use 0.02")
+    for part in ("model", "opt", "stat"):
+        owner = _part(model, part)
+        for field in _float_fields(part):
+            if not np.isfinite(getattr(owner, field)).all():
+                raise ModelError(
+                    f"{name} has a number that is NaN or infinite ({field} of MuJoCo's {part}); "
+                    "look for nan, inf and numbers far too large"
+                )
+
+
+def check_motion(name: str, parts: HasParts) -> None:
+    """Refuse a model whose first step already ends in nonsense.
+
+    Args:
+        name: What a person calls the model.
+        parts: The model, its joints and its controls.
+
+    Raises:
+        ModelError: MuJoCo gives up, or an acceleration is no number.
+    """
+    data = mujoco.MjData(parts.model)
+    for control, start in itertools.product(parts.controls, (0.0, task.RESET_HIGH)):
+        mujoco.mj_resetData(parts.model, data)
+        data.qpos[:], data.qvel[:], data.ctrl[0] = start, start, control
+        try:
+            mujoco.mj_forward(parts.model, data)
+        except mujoco.FatalError as error:
+            reason = " ".join(str(error).split())
+            raise ModelError(f"MuJoCo gives up on {name}: {reason}") from error
+        if not np.isfinite(data.qacc).all():
+            raise ModelError(
+                f"{name} moves off with an acceleration that is NaN or infinite "
+                f"(control {control:g}); look for tiny masses, huge forces, damping and distances"
+            )
+
+
+@functools.cache
+def _float_fields(part: str) -> tuple[str, ...]:
+    """Names of all numbers in a part of a model, whatever MuJoCo's version has there."""
+    owner = _part(mujoco.MjModel.from_xml_string("<mujoco/>"), part)
+    names = [name for name in dir(owner) if not name.startswith("_")]
+    return tuple(name for name in names if _holds_floats(getattr(owner, name)))
+
+
+def _part(model: mujoco.MjModel, part: str) -> Any:  # noqa: ANN401 - MuJoCo has no types
+    return model if part == "model" else getattr(model, part)
+
+
+def _holds_floats(value: object) -> bool:
+    if isinstance(value, float):
+        return True
+    return isinstance(value, np.ndarray) and np.issubdtype(value.dtype, np.floating)

@@ -1,0 +1,337 @@
+"""What makes a compiled model a cart-pole, or the reason why it is none.
+
+Names do not matter. Needed are a slide joint (the cart's), a hinge joint inside its body (the
+pole's), and a motor on the slide joint that can push in two ways; the push must tilt the pole.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Final, Protocol
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+
+from mjcartpole import task
+from mjcartpole.errors import NotACartPoleError
+
+Vector = npt.NDArray[np.float64]
+
+MOST_SUBSTEPS: Final = 1_000
+"""Physics steps per control step."""
+
+LEAST_COUPLING: Final = 0.5
+"""How much of a push along the rail must act in the plane in which the pole turns."""
+
+LEAST_ARM: Final = 1e-6
+"""Metres; where the pole's centre of mass is nearer to the hinge, no angle is upright."""
+
+_KIND: Final = {
+    mujoco.mjtJoint.mjJNT_SLIDE: "slide",
+    mujoco.mjtJoint.mjJNT_HINGE: "hinge",
+    mujoco.mjtJoint.mjJNT_BALL: "ball",
+    mujoco.mjtJoint.mjJNT_FREE: "free",
+}
+
+
+_SHOWN: Final = 6
+
+
+class HasParts(Protocol):
+    """A compiled model whose parts have been found."""
+
+    @property
+    def model(self) -> mujoco.MjModel:
+        """The compiled model."""
+
+    @property
+    def slider(self) -> int:
+        """Index of the cart's joint."""
+
+    @property
+    def hinge(self) -> int:
+        """Index of the pole's joint."""
+
+    @property
+    def controls(self) -> tuple[float, float]:
+        """The actuator's control for action 0 and for action 1."""
+
+
+@dataclass(frozen=True)
+class Directions:
+    """Where the parts of a cart-pole point when both coordinates are 0.
+
+    Attributes:
+        up: The world axis that gravity points away from most (z where there is none), shape (3,).
+        rail: Where a positive x goes, unit, shape (3,).
+        lean: Where the top of an upright pole goes as the angle grows, shape (3,); a unit vector
+            if the hinge is horizontal.
+        arm: From the hinge's axis to the pole's centre of mass, across the axis, m, shape (3,).
+        upright: The angle at which the pole's centre of mass stands straight above the hinge, rad;
+            0 where it lies on the hinge.
+    """
+
+    up: Vector
+    rail: Vector
+    lean: Vector
+    arm: Vector
+    upright: float
+
+    @property
+    def coupling(self) -> float:
+        """1 where a positive angle leans along the rail, -1 where it leans against it."""
+        return float(self.lean @ self.rail)
+
+
+def find_joints(name: str, model: mujoco.MjModel) -> tuple[int, int]:
+    """Indices of the cart's and the pole's joint.
+
+    Raises:
+        NotACartPoleError: There are not exactly these two, or the hinge is not inside the cart.
+    """
+    kinds = [mujoco.mjtJoint(int(kind)) for kind in model.jnt_type]
+    for kind in (mujoco.mjtJoint.mjJNT_FREE, mujoco.mjtJoint.mjJNT_BALL):
+        if kind in kinds:
+            raise refusal(
+                name, model, f"a {_KIND[kind]} joint, that is neither the cart's nor the pole's"
+            )
+    slider = _only(name, model, mujoco.mjtJoint.mjJNT_SLIDE, "the cart's")
+    hinge = _only(name, model, mujoco.mjtJoint.mjJNT_HINGE, "the pole's")
+    if not _is_below(model, model.jnt_bodyid[hinge], model.jnt_bodyid[slider]):
+        raise refusal(name, model, "a hinge whose body is not inside the cart's body")
+    return slider, hinge
+
+
+def _only(name: str, model: mujoco.MjModel, kind: mujoco.mjtJoint, whose: str) -> int:
+    """Index of the only joint of a kind; slide and hinge joints have one coordinate each."""
+    word = _KIND[kind]
+    found = [index for index in range(model.njnt) if model.jnt_type[index] == kind]
+    if len(found) == 1:
+        return found[0]
+    amount = f"{len(found)} {word} joints" if found else f"no {word} joint"
+    several = "; several poles are not supported yet" if len(found) > 1 and word == "hinge" else ""
+    raise refusal(name, model, f"{amount} where one ({whose}) is needed{several}")
+
+
+def _is_below(model: mujoco.MjModel, body: int, ancestor: int) -> bool:
+    while body not in (0, ancestor):
+        body = model.body_parentid[body]
+    return bool(body == ancestor)
+
+
+def find_controls(name: str, model: mujoco.MjModel, slider: int) -> tuple[float, float]:
+    """Controls of the two actions: the ends of the actuator's range, or -1 and 1 without one.
+
+    Action 1 is the one that pushes more towards positive x.
+
+    Raises:
+        NotACartPoleError: There is not exactly one motor, or it cannot push in two ways.
+    """
+    _check_motor(name, model, slider)
+    low, high = -1.0, 1.0
+    if model.actuator_ctrllimited[0]:
+        low, high = (float(end) for end in model.actuator_ctrlrange[0])
+    left, right = (push(model, slider, control) for control in (low, high))
+    if left == right:
+        raise refusal(
+            name,
+            model,
+            f"a motor that pushes with {left + 0.0:g} N whatever the control, by its gear, gain "
+            "and ranges",
+        )
+    return (low, high) if left < right else (high, low)
+
+
+def push(model: mujoco.MjModel, slider: int, control: float) -> float:
+    """Force along the slider by a control, N, after the limits that clip it.
+
+    A servo's (`is_servo`) is that at rest at x = 0.
+    """
+    force = float(model.actuator_gainprm[0, 0]) * control
+    if model.actuator_biastype[0] != mujoco.mjtBias.mjBIAS_NONE:
+        force += float(model.actuator_biasprm[0, 0])
+    if model.actuator_forcelimited[0]:
+        force = float(np.clip(force, *model.actuator_forcerange[0]))
+    force *= float(model.actuator_gear[0, 0])
+    if model.jnt_actfrclimited[slider]:
+        force = float(np.clip(force, *model.jnt_actfrcrange[slider]))
+    return force
+
+
+def _check_motor(name: str, model: mujoco.MjModel, slider: int) -> None:
+    if model.nu != 1:
+        amount = f"{model.nu} actuators" if model.nu else "no actuator"
+        raise refusal(name, model, f"{amount} where one plain motor is needed")
+    transmission = mujoco.mjtTrn(int(model.actuator_trntype[0]))
+    on_joint = transmission in {mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT}
+    if not on_joint or model.actuator_trnid[0, 0] != slider:
+        word = transmission.name.removeprefix("mjTRN_").lower()
+        what = "another joint" if on_joint else f"a {word}"
+        raise refusal(
+            name,
+            model,
+            f"an actuator that does not push along the slide joint (it acts on {what})",
+        )
+    if model.na or model.actuator_dyntype[0] != mujoco.mjtDyn.mjDYN_NONE:
+        kind = mujoco.mjtDyn(int(model.actuator_dyntype[0])).name.removeprefix("mjDYN_").lower()
+        raise refusal(
+            name, model, f"an actuator with activation states ({kind}) instead of a plain motor"
+        )
+    if model.actuator_gaintype[0] != mujoco.mjtGain.mjGAIN_FIXED and not _is_fixed_gain(model):
+        raise refusal(name, model, "an actuator whose force is not in proportion to its control")
+
+
+def _is_fixed_gain(model: mujoco.MjModel) -> bool:
+    affine = model.actuator_gaintype[0] == mujoco.mjtGain.mjGAIN_AFFINE
+    return bool(affine and not model.actuator_gainprm[0, 1:3].any())
+
+
+def is_servo(model: mujoco.MjModel) -> bool:
+    """Whether the actuator's force depends on more than its control: position or velocity."""
+    biased = model.actuator_biastype[0] != mujoco.mjtBias.mjBIAS_NONE
+    return bool(biased and model.actuator_biasprm[0, 1:3].any())
+
+
+def find_substeps(name: str, model: mujoco.MjModel) -> int:
+    """Physics steps that fill a control step of 0.02 s.
+
+    Raises:
+        NotACartPoleError: The timestep does not divide it, or there would be too many.
+    """
+    timestep = float(model.opt.timestep)
+    substeps = round(task.CONTROL_STEP / timestep)
+    if substeps > MOST_SUBSTEPS:
+        raise NotACartPoleError(
+            f"{name}: timestep {timestep:g} s makes {substeps:g} physics steps of one control step "
+            f"of {task.CONTROL_STEP} s, and no more than {MOST_SUBSTEPS} are done; use 0.001 …"
+        )
+    if substeps < 1 or abs(substeps * timestep - task.CONTROL_STEP) > 1e-12:
+        raise NotACartPoleError(
+            f"{name}: timestep {timestep:g} s does not divide the control step of "
+            f"{task.CONTROL_STEP} s; use 0.02, 0.01, 0.005, 0.002 …"
+        )
+    return substeps
+
+
+def directions(parts: HasParts) -> Directions:
+    """Where the parts of a cart-pole point when both coordinates are 0."""
+    model, slider, hinge = parts.model, parts.slider, parts.hinge
+    data = mujoco.MjData(model)
+    data.qpos[:] = 0.0
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_comPos(model, data)
+    axis = data.xaxis[hinge]
+    arm = data.subtree_com[model.jnt_bodyid[hinge]] - data.xanchor[hinge]
+    arm = arm - (arm @ axis) * axis
+    up = _up(model.opt.gravity)
+    lean = np.cross(axis, up)
+    angle = 0.0
+    if np.linalg.norm(arm) >= LEAST_ARM:
+        # From where the arm points to where `up` does, about the axis.
+        angle = math.atan2(float(axis @ np.cross(arm, up)), float(arm @ up))
+    return Directions(up, data.xaxis[slider].copy(), lean, arm, angle)
+
+
+def _up(gravity: Vector) -> Vector:
+    """The signed world axis that is nearest to straight against gravity."""
+    pulls = np.abs(gravity)
+    axis = 2 if pulls[2] >= pulls.max() else int(pulls.argmax())
+    up = np.zeros(3)
+    up[axis] = 1.0 if gravity[axis] <= 0 else -1.0
+    return up
+
+
+def check_directions(name: str, parts: HasParts) -> Directions:
+    """Refuse a pole that no push along the rail tilts.
+
+    Raises:
+        NotACartPoleError: As said; the reason is named.
+    """
+    found = directions(parts)
+    if abs(found.rail @ found.up) > 1 - LEAST_COUPLING**2:
+        raise refusal(name, parts.model, "a slide joint that goes up and down, not along a rail")
+    if np.linalg.norm(found.lean) < LEAST_COUPLING:
+        raise refusal(name, parts.model, "a hinge that turns about the vertical")
+    if abs(found.coupling) < LEAST_COUPLING:
+        raise refusal(
+            name,
+            parts.model,
+            "a hinge whose axis is along the rail, so a push does not tilt the pole",
+        )
+    return found
+
+
+def count_from_upright(name: str, parts: HasParts, upright: float) -> float:
+    """Change, in place, from where a compiled model counts the hinge's angle.
+
+    It is what the attribute `ref` does in a document: the pose stays, its coordinate moves. No
+    derived value of the model depends on it.
+
+    Args:
+        name: What a person calls the model.
+        parts: The model and its joints.
+        upright: The angle that becomes 0, rad; of those a full turn apart, one inside the limits.
+
+    Returns:
+        The angle that became 0, rad.
+
+    Raises:
+        NotACartPoleError: Something else in the model counts by the old angle.
+    """
+    model, hinge = parts.model, parts.hinge
+    upright = _within_limits(model, hinge, upright)
+    if model.ntendon or model.nplugin:
+        raise refusal(
+            name,
+            model,
+            f"a pole that stands upright at {math.degrees(upright):.4g} degrees instead of 0, with "
+            "tendons or plugins that count its angle",
+        )
+    model.qpos0[hinge] -= upright
+    model.qpos_spring[hinge] -= upright
+    model.jnt_range[hinge] -= upright
+    model.key_qpos[:, hinge] -= upright
+    return upright
+
+
+def _within_limits(model: mujoco.MjModel, hinge: int, angle: float) -> float:
+    low, high = model.jnt_range[hinge]
+    for turned in (angle, angle + 2 * math.pi, angle - 2 * math.pi):
+        if not model.jnt_limited[hinge] or low <= turned <= high:
+            return turned
+    return angle
+
+
+def check_limits(name: str, parts: HasParts) -> None:
+    """Refuse joints whose limits keep them from position 0, where episodes start.
+
+    Raises:
+        NotACartPoleError: As said.
+    """
+    model = parts.model
+    for joint, place in ((parts.slider, "x = 0"), (parts.hinge, "the upright position")):
+        low, high = model.jnt_range[joint]
+        if model.jnt_limited[joint] and not low <= 0.0 <= high:
+            label = model.joint(joint).name or f"number {joint}"
+            raise refusal(
+                name,
+                model,
+                f"a range from {low:g} to {high:g} of joint '{label}' that leaves out {place}",
+            )
+
+
+def refusal(name: str, model: mujoco.MjModel, found: str) -> NotACartPoleError:
+    """The error that says what a model has instead of what a cart-pole needs."""
+    joints = [
+        f"{model.joint(index).name or 'unnamed'} ({_KIND[mujoco.mjtJoint(int(kind))]})"
+        for index, kind in enumerate(model.jnt_type[:_SHOWN])
+    ]
+    actuators = [model.actuator(index).name or "unnamed" for index in range(min(model.nu, _SHOWN))]
+    joints += ["…"] * (model.njnt > _SHOWN)
+    actuators += ["…"] * (model.nu > _SHOWN)
+    return NotACartPoleError(
+        f"{name} is not a cart-pole: it has {found} "
+        f"[joints: {', '.join(joints) or 'none'}; actuators: {', '.join(actuators) or 'none'}]; "
+        "needed are a slide joint for the cart, one hinge joint inside it, and one motor on the "
+        "slide joint"
+    )

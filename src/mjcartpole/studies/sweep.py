@@ -1,0 +1,188 @@
+"""How far may a parameter move before a policy fails?"""
+
+import itertools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from decimal import Decimal, InvalidOperation
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from mjcartpole import task
+from mjcartpole.errors import ConfigError
+from mjcartpole.integrator import Integrator
+from mjcartpole.learning.policy import Policy
+from mjcartpole.physics.edit import edits_of
+from mjcartpole.physics.model import Edits, ModelLike, load_model
+from mjcartpole.studies.evaluation import EPISODES, SEED, check_count
+from mjcartpole.studies.transfer import GYM, Cell, TransferResult, find_place, transfer
+
+MOST_VALUES: Final = 1_000
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """Neighbouring values at which a policy does not fail.
+
+    Attributes:
+        low: The first.
+        high: The last.
+        open_low: Whether the sweep begins here, so that it may reach further down.
+        open_high: Whether the sweep ends here.
+    """
+
+    low: float
+    high: float
+    open_low: bool
+    open_high: bool
+
+    def __str__(self) -> str:
+        low = f"{self.low:g} (where the sweep begins)" if self.open_low else f"{self.low:g}"
+        high = f"{self.high:g} (where it ends)" if self.open_high else f"{self.high:g}"
+        return f"{low} to {high}"
+
+
+@dataclass(frozen=True, eq=False)
+class SweepResult:
+    """Every policy at every value of one parameter.
+
+    Attributes:
+        key: What was changed, as `edit_document` knows it.
+        values: Rising.
+        model: Name of the model that was edited.
+        played: Every policy (row) at every value (column).
+        threshold: A mean return from here up is no failure.
+    """
+
+    key: str
+    values: tuple[float, ...]
+    model: str
+    played: TransferResult
+    threshold: float = task.REWARD_THRESHOLD
+
+    @property
+    def means(self) -> npt.NDArray[np.float64]:
+        """Mean returns, shape (policies, values); NaN where the simulation diverged."""
+        return self.played.means
+
+    def stretches(self, policy: str) -> list[Stretch]:
+        """Where a policy does not fail, from low to high."""
+        good = self.means[self.played.policies.index(policy)] >= self.threshold
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], good, [False]])))
+        last = len(self.values) - 1
+        return [
+            Stretch(self.values[first], self.values[end - 1], first == 0, end - 1 == last)
+            for first, end in edges.reshape(-1, 2).tolist()
+        ]
+
+    def longest(self, policy: str) -> Stretch | None:
+        """The widest stretch without a failure; None if every value fails."""
+        found = self.stretches(policy)
+        return max(found, key=lambda stretch: stretch.high - stretch.low) if found else None
+
+    def points(self) -> list[tuple[float, Cell]]:
+        """Each cell with its value, policy by policy."""
+        rows = self.played.rows
+        return [pair for row in rows for pair in zip(self.values, row, strict=True)]
+
+    def summary(self) -> dict[str, Any]:
+        """Everything as plain values, for JSON."""
+        points = [
+            {"value": value, **cell.summary(), "model": self.model} for value, cell in self.points()
+        ]
+        return {
+            "parameter": self.key,
+            "values": list(self.values),
+            "model": self.model,
+            "seed": self.played.seed,
+            "threshold": self.threshold,
+            "holds": {name: self._spans(name) for name in self.played.policies},
+            "points": points,
+        }
+
+    def _spans(self, policy: str) -> list[list[float]]:
+        return [[stretch.low, stretch.high] for stretch in self.stretches(policy)]
+
+
+def parse_sweep(text: str) -> tuple[str, tuple[float, ...]]:
+    """A sweep from the command line.
+
+    >>> parse_sweep("pole.length=0.1:0.4:0.1")
+    ('pole.length', (0.1, 0.2, 0.3, 0.4))
+
+    Returns:
+        What is changed, and its values; the last is the end, if the steps meet it.
+
+    Raises:
+        ConfigError: It is not KEY=FROM:TO:STEP, or its numbers make no sense.
+    """
+    key, _, span = text.rpartition("=")
+    try:
+        # Decimal: a tenth is to stay a tenth, however often it is added.
+        start, stop, step = (Decimal(word.strip()) for word in span.split(":"))
+        if not (start.is_finite() and stop.is_finite() and step.is_finite()):
+            raise ValueError
+    except (ValueError, InvalidOperation):
+        raise ConfigError(
+            f"'{text}' is no sweep; give NAME=FROM:TO:STEP, such as pole.length=0.5:3:0.25"
+        ) from None
+    if not key.strip() or step <= 0 or stop < start:
+        raise ConfigError(
+            f"'{text}' is no sweep: it needs a name, a step above 0, and FROM below TO, "
+            "such as pole.length=0.5:3:0.25"
+        )
+    count = (stop - start) // step + 1
+    if count > MOST_VALUES:
+        raise ConfigError(f"'{text}' has {count:.3g} values; at most {MOST_VALUES:,} make sense")
+    return key.strip(), tuple(float(start + index * step) for index in range(int(count)))
+
+
+def sweep(
+    policies: Mapping[str, Policy],
+    model: ModelLike,
+    key: str,
+    values: Sequence[float],
+    *,
+    edits: Edits = None,
+    integrator: Integrator = "gym",
+    episodes: int = EPISODES,
+    seed: int = SEED,
+    workers: int | None = None,
+) -> SweepResult:
+    """Play every policy on a model at each value of one of its parameters.
+
+    Args:
+        policies: By name.
+        model: What is edited; see `load_model`.
+        key: What is changed; see `edit_document`.
+        values: Rising.
+        edits: What else is changed, at all values; see `load_model`.
+        integrator: See `Simulation`.
+        episodes: Greedy episodes for each policy and value.
+        seed: Seeds the starting states and the bootstrap.
+        workers: How many at once; as many as there are cores if left out.
+
+    Raises:
+        ConfigError: The key names nothing that is there, a value is outside physics, or a number
+            makes no sense; nothing has been played then.
+        ModelError: The model cannot be used, or a value makes it one that cannot.
+    """
+    check_count(episodes, seed)
+    others = edits_of(edits or ())
+    _check(model, key, values, others)
+    base = load_model(model)
+    places = [find_place(base, {**others, key: value}, integrator) for value in values]
+    played = transfer(policies, places, episodes=episodes, seed=seed, workers=workers)
+    return SweepResult(key, tuple(map(float, values)), base.name, played)
+
+
+def _check(
+    model: ModelLike, key: str, values: Sequence[float], edits: Mapping[str, object]
+) -> None:
+    if model == GYM:
+        raise ConfigError("gymnasium's CartPole-v1 cannot be swept; give a model, as 'cartpole'")
+    if key in edits:
+        raise ConfigError(f"'{key}' is set and swept; give it once")
+    if not values or any(a >= b for a, b in itertools.pairwise(values)):
+        raise ConfigError(f"a sweep needs rising values, not {list(values)}")

@@ -1,0 +1,212 @@
+"""How far does a policy carry? Every policy on every model, from the same starting states."""
+
+import concurrent.futures
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from mjcartpole.envs.backend import Backend
+from mjcartpole.errors import ConfigError, MjCartPoleError
+from mjcartpole.integrator import Integrator
+from mjcartpole.learning.policy import Policy
+from mjcartpole.physics.model import CartPole, Edits, ModelLike, load_model
+from mjcartpole.studies.evaluation import EPISODES, SEED, Evaluation, check_count, evaluate
+from mjcartpole.studies.statistics import Interval, bootstrap_interval
+
+GYM: Final = "gym"
+"""The place that is gymnasium's own CartPole-v1, instead of a model."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where policies are played.
+
+    Attributes:
+        name: What a person calls it.
+        cartpole: What moves; None for gymnasium's CartPole-v1.
+        integrator: See `Simulation`.
+    """
+
+    name: str
+    cartpole: CartPole | None
+    integrator: Integrator = "gym"
+
+    @property
+    def backend(self) -> Backend:
+        """Who does the physics."""
+        return "gym" if self.cartpole is None else "mujoco"
+
+
+@dataclass(frozen=True, eq=False)
+class Cell:
+    """One policy at one place.
+
+    Attributes:
+        policy: The policy's name.
+        place: The place's name.
+        evaluation: The episodes; None if they could not be played.
+        interval: 95 % bootstrap interval of the mean return over episodes.
+        error: Why they could not be played; empty if they could.
+    """
+
+    policy: str
+    place: str
+    evaluation: Evaluation | None = None
+    interval: Interval | None = None
+    error: str = ""
+
+    @property
+    def mean(self) -> float:
+        """Mean return; NaN if the episodes could not be played."""
+        return float("nan") if self.evaluation is None else float(self.evaluation.returns.mean())
+
+    def summary(self) -> dict[str, Any]:
+        """The figures as plain values, for JSON and CSV; None where there are none."""
+        evaluation, interval = self.evaluation, self.interval
+        known = evaluation is not None and interval is not None
+        return {
+            "policy": self.policy,
+            "model": self.place,
+            "mean": self.mean if known else None,
+            "low": interval.low if interval else None,
+            "high": interval.high if interval else None,
+            "minimum": float(evaluation.returns.min()) if evaluation else None,
+            "episodes": len(evaluation.episodes) if evaluation else 0,
+            **(evaluation.endings if evaluation else {}),
+            "error": self.error,
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class TransferResult:
+    """Every policy on every model.
+
+    Attributes:
+        policies: Names, one per row.
+        places: Names, one per column.
+        cells: Row by row.
+        seed: Of the starting states, which are the same in every cell.
+    """
+
+    policies: tuple[str, ...]
+    places: tuple[str, ...]
+    cells: tuple[Cell, ...]
+    seed: int
+
+    @property
+    def rows(self) -> list[tuple[Cell, ...]]:
+        """The cells of each policy."""
+        width = len(self.places)
+        return [self.cells[start : start + width] for start in range(0, len(self.cells), width)]
+
+    @property
+    def means(self) -> npt.NDArray[np.float64]:
+        """Mean returns, shape (policies, places); NaN where there is none."""
+        return np.array([[cell.mean for cell in row] for row in self.rows])
+
+    @property
+    def failed(self) -> list[Cell]:
+        """The cells whose episodes could not be played."""
+        return [cell for cell in self.cells if cell.error]
+
+    def summary(self) -> dict[str, Any]:
+        """Everything as plain values, for JSON."""
+        return {
+            "policies": list(self.policies),
+            "models": list(self.places),
+            "seed": self.seed,
+            "cells": [cell.summary() for cell in self.cells],
+        }
+
+
+def find_place(model: ModelLike, edits: Edits = None, integrator: Integrator = "gym") -> Place:
+    """A model as a place, with some things in it changed; `"gym"` is gymnasium's CartPole-v1.
+
+    Args:
+        model: See `load_model`, or `"gym"`, which no edit changes.
+        edits: See `load_model`.
+        integrator: See `Simulation`; gymnasium's keeps its own.
+
+    Raises:
+        ModelError: The model cannot be used; the message names it.
+        ConfigError: An edit names nothing that is there, or a value is outside physics.
+    """
+    if model == GYM:
+        return Place(GYM, None)
+    cartpole = load_model(model, edits)
+    return Place(cartpole.name, cartpole, integrator)
+
+
+def transfer(
+    policies: Mapping[str, Policy],
+    places: Sequence[Place | ModelLike],
+    *,
+    episodes: int = EPISODES,
+    seed: int = SEED,
+    workers: int | None = None,
+) -> TransferResult:
+    """Play every policy at every place.
+
+    All cells see the same starting states, so that their differences are those of policies and
+    models. The same seed gives the same result, whatever the number of workers.
+
+    Args:
+        policies: By name.
+        places: Places, or what `find_place` takes.
+        episodes: Greedy episodes per cell.
+        seed: Seeds the starting states and the bootstrap.
+        workers: How many cells at once; as many as there are cores if left out.
+
+    Raises:
+        ConfigError: There is no policy or place, or a number makes no sense.
+        ModelError: A model cannot be used; nothing has been played then.
+    """
+    check_count(episodes, seed)
+    if not policies or not places:
+        raise ConfigError("a transfer needs one policy and one model at least")
+    found = [place if isinstance(place, Place) else find_place(place) for place in places]
+    pairs = [(name, place) for name in policies for place in found]
+    with _pool(workers, len(pairs)) as pool:
+        futures = [
+            pool.submit(_play, name, policies[name], place, episodes, seed) for name, place in pairs
+        ]
+        try:
+            cells = tuple(future.result() for future in futures)
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+    return TransferResult(tuple(policies), tuple(place.name for place in found), cells, seed)
+
+
+def _pool(workers: int | None, jobs: int) -> concurrent.futures.ThreadPoolExecutor:
+    """Threads: the compiled engine leaves Python's lock alone."""
+    if workers is not None and workers < 1:
+        raise ConfigError(f"workers must be a whole number from 1 up, not {workers}")
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    return concurrent.futures.ThreadPoolExecutor(min(workers or cores or 1, jobs))
+
+
+def _play(name: str, policy: Policy, place: Place, episodes: int, seed: int) -> Cell:
+    try:
+        evaluation = evaluate(
+            policy,
+            backend=place.backend,
+            model=place.cartpole or "cartpole",
+            integrator=place.integrator,
+            episodes=episodes,
+            seed=seed,
+        )
+    except MjCartPoleError as error:
+        # One model that diverges is no reason to lose the others.
+        return Cell(name, place.name, error=str(error))
+    return Cell(name, place.name, evaluation, _interval(evaluation.returns, seed))
+
+
+def _interval(returns: npt.NDArray[np.float64], seed: int) -> Interval:
+    if (returns == returns[0]).all():
+        return Interval(float(returns[0]), float(returns[0]))
+    return bootstrap_interval(returns, lambda sample: float(sample.mean()), seed=seed)

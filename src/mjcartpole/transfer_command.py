@@ -1,0 +1,164 @@
+"""What `mjcartpole transfer` does and prints."""
+
+import csv
+import io
+import json
+import re
+import sys
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from PIL import Image
+
+from mjcartpole.commands import Choice, set_stage
+from mjcartpole.errors import ConfigError
+from mjcartpole.files import check_writable, make_folder, replacing, write_whole
+from mjcartpole.integrator import Integrator
+from mjcartpole.learning.policy import Policy
+from mjcartpole.physics.model import Edits, model_names
+from mjcartpole.physics.simulation import silence_mujoco
+from mjcartpole.studies.evaluation import EPISODES, SEED
+from mjcartpole.studies.heatmap import curves, heat_map
+from mjcartpole.studies.sweep import SweepResult, parse_sweep, sweep
+from mjcartpole.studies.transfer import GYM, Cell, TransferResult, find_place, transfer
+
+TRANSFER = Path("transfer")
+"""Where the files go, unless told otherwise."""
+
+FAILED = 2
+
+
+def run_transfer(
+    sources: Sequence[Path],
+    *,
+    models: Sequence[str] = (),
+    edits: Edits = None,
+    swept: str | None = None,
+    integrator: Integrator = "gym",
+    episodes: int = EPISODES,
+    seed: int = SEED,
+    workers: int | None = None,
+    output: Path = TRANSFER,
+) -> int:
+    """Play policies on models they were not trained on, print and write. Returns the exit code.
+
+    Args:
+        sources: Run folders or policy files.
+        models: Names or paths, and "gym"; all that come with the package, and gym, if left out.
+            A sweep takes one: the first run's own if left out.
+        edits: Changes in every model; see `load_model`.
+        swept: A sweep, such as "pole.length=0.5:3:0.25", instead of the matrix.
+        integrator: See `Simulation`.
+        episodes: Greedy episodes of each policy on each model.
+        seed: Seeds the starting states.
+        workers: How many evaluations at once; as many as there are cores if left out.
+        output: Folder for the CSV, JSON and PNG.
+
+    Raises:
+        MjCartPoleError: Something cannot be used; nothing has been played then.
+    """
+    silence_mujoco()
+    policies = _find_policies(sources)
+    settings: dict[str, Any] = {"episodes": episodes, "seed": seed, "workers": workers}
+    if swept is None:
+        chosen = models or (GYM, *model_names())
+        places = [find_place(model, edits, integrator) for model in dict.fromkeys(chosen)]
+        check_writable(make_folder(output))
+        matrix = transfer(policies, places, **settings)
+        _print_matrix(matrix)
+        rows = [cell.summary() for cell in matrix.cells]
+        _write(output, "transfer", rows, matrix.summary(), heat_map(matrix))
+        return _tell_failed(matrix)
+    key, values = parse_sweep(swept)
+    if len(models) > 1:
+        raise ConfigError(f"a sweep edits one model, not {len(models)}; give one, or no --sweep")
+    model = models[0] if models else set_stage(sources[0], Choice()).model
+    check_writable(make_folder(output))
+    curve = sweep(policies, model, key, values, edits=edits, integrator=integrator, **settings)
+    _print_sweep(curve)
+    summary = curve.summary()
+    name = "sweep-" + re.sub(r"[^\w.-]+", "-", key)
+    _write(output, name, summary["points"], summary, curves(curve))
+    return _tell_failed(curve.played)
+
+
+def _find_policies(sources: Sequence[Path]) -> dict[str, Policy]:
+    """Policies by name; those of one name are called by their paths."""
+    if not sources:
+        raise ConfigError("transfer needs a RUN-OR-POLICY, or several")
+    stages = {source: set_stage(source, Choice()) for source in sources}
+    count = Counter(stage.name for stage in stages.values())
+    return {
+        stage.name if count[stage.name] == 1 else str(source): stage.policy
+        for source, stage in stages.items()
+    }
+
+
+def _print_matrix(result: TransferResult) -> None:
+    """One line per model, one column per policy."""
+    print(f"mean greedy return and 95 % interval, seed {result.seed}\n")
+    names = [_short(name) for name in result.policies]
+    wide = max(20, *(len(name) + 2 for name in names))
+    first = max(len(name) for name in result.places)
+    print(" " * first + "".join(f"{name:>{wide}}" for name in names))
+    for column, place in enumerate(result.places):
+        print(f"{place:{first}}" + "".join(f"{_cell(row[column]):>{wide}}" for row in result.rows))
+
+
+def _print_sweep(result: SweepResult) -> None:
+    print(f"mean greedy return on {result.model}, seed {result.played.seed}\n")
+    names = [_short(name) for name in result.played.policies]
+    wide = max(20, *(len(name) + 2 for name in names))
+    first = max(10, len(result.key))
+    print(f"{result.key:>{first}}" + "".join(f"{name:>{wide}}" for name in names))
+    for column, value in enumerate(result.values):
+        cells = (row[column] for row in result.played.rows)
+        print(f"{value:{first}g}" + "".join(f"{_cell(cell):>{wide}}" for cell in cells))
+    print()
+    for name in result.played.policies:
+        stretch = result.longest(name)
+        where = f"at {result.key} from {stretch}" if stretch else "nowhere in this sweep"
+        print(f"{name}: the mean return is at least {result.threshold:g} {where}")
+
+
+def _cell(cell: Cell) -> str:
+    if cell.interval is None:
+        return "failed"
+    return f"{cell.mean:.1f} ({cell.interval.low:.0f}-{cell.interval.high:.0f})"
+
+
+def _short(name: str, most: int = 30) -> str:
+    return name if len(name) <= most else f"…{name[1 - most :]}"
+
+
+def _write(
+    folder: Path,
+    name: str,
+    rows: Sequence[Mapping[str, Any]],
+    summary: Mapping[str, Any],
+    picture: Image.Image,
+) -> None:
+    write_whole(folder / f"{name}.csv", _csv(rows))
+    text = json.dumps(summary, indent=2, allow_nan=False)
+    write_whole(folder / f"{name}.json", text + "\n")
+    with replacing(folder / f"{name}.png") as temporary:
+        picture.save(temporary)
+    print(f"\nwritten {folder / name}.csv, .json and .png")
+
+
+def _csv(rows: Sequence[Mapping[str, Any]]) -> str:
+    columns = list(dict.fromkeys(key for row in rows for key in row))
+    text = io.StringIO()
+    writer = csv.DictWriter(text, columns, lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    return text.getvalue()
+
+
+def _tell_failed(result: TransferResult) -> int:
+    for cell in result.failed:
+        message = f"{cell.policy} on {cell.place} failed: {cell.error}"
+        print(f"mjcartpole: error: {message}", file=sys.stderr)
+    return FAILED if result.failed else 0

@@ -1,0 +1,113 @@
+"""What is said of a model is what the model does."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mjcartpole.physics.describe import Description, axis_name, describe
+from mjcartpole.physics.model import load_model, models_folder
+from mjcartpole.physics.simulation import Simulation
+
+MODELS = sorted((Path(__file__).parent / "models").glob("*.xml"))
+REFERENCE = (models_folder() / "cartpole.xml").read_text(encoding="utf-8")
+
+
+def described(name: str) -> Description:
+    return describe(load_model(Path(__file__).parent / "models" / f"{name}.xml"))
+
+
+def test_the_reference():
+    assert describe(load_model()).text() == [
+        "cart        joint 'slider' of body 'cart', 1 kg",
+        "pole        joint 'hinge' of body 'pole', 0.1 kg, centre of mass 0.5 m from the hinge",
+        "rail        along +x, no ends; an episode ends at 2.4 m",
+        "up          +z; gravity 0 0 -9.8 m/s^2",
+        "angle       0 is upright, a positive angle leans to +x of the rail",
+        "force       action 0: -10 N, action 1: 10 N (control -1 or 1, gear 10)",
+        "time        1 step of 0.02 s per action, 0.02 s",
+        "integrator  Euler",
+        "equations   apply",
+    ]
+
+
+def test_a_rail_along_y_a_hinge_and_a_gear_that_turn_backwards():
+    found = described("lying_rail")
+    assert (found.rail, found.up, found.leans) == ("+y", "+z", -1)
+    assert (found.forces, found.controls) == ((-8.0, 8.0), (1.0, -1.0))
+    assert (found.substeps, found.timestep, found.integrator) == (5, 0.004, "implicitfast")
+    assert found.control_step == pytest.approx(0.02)
+    assert (found.cart_mass, found.pole_mass) == pytest.approx((0.8, 0.15))
+    assert found.com_distance == pytest.approx((0.05 * 0.3 + 0.1 * 0.6) / 0.15 - 0.01)
+    assert found.rail_limits == (-2.0, 2.0)
+
+
+def test_a_pole_that_hangs_at_angle_0():
+    found = described("hanging")
+    assert found.upright == pytest.approx(math.pi)
+    assert found.balance == pytest.approx(0.0, abs=1e-12)
+    angle = next(line for line in found.text() if line.startswith("angle"))
+    assert "the file has upright at 180 degrees, angles are counted from there" in angle
+
+
+def test_y_up_and_no_names():
+    found = described("y_up")
+    assert (found.cart, found.pole) == (
+        "joint 'a' of body 1 (unnamed)",
+        "joint 1 (unnamed) of body 2 (unnamed)",
+    )
+    assert (found.up, found.leans, found.forces) == ("+y", -1, (-10.0, 10.0))
+    assert not found.equations_apply
+
+
+@pytest.mark.parametrize(
+    ("change", "line"),
+    [
+        (('pos="0 0 0.5" mass', 'pos="0.01 0 0.5" mass'), "it balances at -1.15 degrees"),
+        (('pos="0 0 0.5" mass', 'pos="0 0 0" mass'), "on the hinge, so that it cannot fall"),
+        (("0 0 -9.8", "0 0 0"), "up          +z; gravity 0 0 0"),
+        (("0 0 -9.8", "3 0 -9.8"), "up          +z; gravity 3 0 -9.8"),
+        (('axis="0 1 0"', 'axis="0 -1 0"'), "a positive angle leans to -x"),
+        (('axis="1 0 0"', 'axis="1 0.5 0"'), "along (0.8944 0.4472 0)"),
+        (('ctrlrange="-1 1"', 'ctrlrange="-1 1" forcerange="-0.5 2"'), "action 0: -5 N, action 1"),
+        (
+            ('<motor name="push" joint="slider" gear="10"', '<position joint="slider" kp="7"'),
+            "action 0: -7 N, action 1: 7 N at rest at x = 0, by a servo (control -1 or 1, gear 1)",
+        ),
+        (('"Euler"', '"RK4"'), "apply to the accelerations, not to a step: integrator RK4"),
+        (('name="hinge"', 'name="hinge" frictionloss="1"'), "do not apply: friction loss in joint"),
+    ],
+)
+def test_what_a_change_is_said_to_change(change, line):
+    assert change[0] in REFERENCE
+    text = "\n".join(describe(load_model(REFERENCE.replace(*change))).text())
+    assert line in text
+
+
+@pytest.mark.parametrize("path", [models_folder() / "cartpole.xml", *MODELS], ids=lambda p: p.stem)
+def test_the_simulation_does_what_the_description_says(path):
+    """Pushed by action 1, the cart goes to positive x and the pole leans back; it falls from 0.1.
+
+    Balance and force are checked by the accelerations at rest.
+    """
+    cartpole = load_model(path)
+    found, simulation = describe(cartpole), Simulation(cartpole, "gym")
+    states = np.array([[0, 0, 0.1, 0], [0, 0, -0.1, 0], [0, 0, found.balance, 0]])
+    middle = sum(found.controls) / 2
+    accelerations = simulation.accelerations(states, np.full(3, middle))
+    assert accelerations[0, 1] > 0 > accelerations[1, 1]
+    assert accelerations[2, 1] == pytest.approx(0.0, abs=1e-9)
+    pushed = simulation.accelerations(np.zeros((2, 4)), np.array(found.controls))
+    assert pushed[0, 0] < 0 < pushed[1, 0]
+    assert np.sign(pushed[:, 1]).tolist() == [found.leans, -found.leans]
+    # At rest: force = (all mass) * x_acc + pole_mass * com_distance * theta_acc, signed.
+    mass = found.cart_mass + found.pole_mass
+    lever = found.leans * found.pole_mass * found.com_distance * math.cos(found.balance)
+    force = mass * pushed[:, 0] + lever * pushed[:, 1]
+    assert force == pytest.approx(found.forces)
+
+
+def test_axes_have_names():
+    assert axis_name(np.array([0.0, -1.0, 0.0])) == "-y"
+    assert axis_name(np.array([0.6, 0.0, 0.8])) == "(0.6 0 0.8)"

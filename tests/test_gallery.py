@@ -1,0 +1,137 @@
+"""The shipped models: each loads, is what it says, and moves as the equations say they do."""
+
+import re
+
+import numpy as np
+import pytest
+
+from mjcartpole.learning.config import TrainConfig
+from mjcartpole.physics.edit import describe_edits, differs_from, edit_document
+from mjcartpole.physics.model import load_model, model_names, models_folder, same_model
+from mjcartpole.physics.simulation import Simulation
+from mjcartpole.studies.evaluation import evaluate
+from mjcartpole.studies.parity import Subject, run_ladder
+
+REFERENCE = load_model("cartpole").xml
+EDITS = {
+    "long": {"pole.length": 2},
+    "short": {"pole.length": 0.4},
+    "heavy": {"pole.mass": 1, "geom:pole.size": "0.05"},
+    "damped": {"hinge.damping": 0.05},
+    "friction": {"rail.friction": 2},
+    "moon": {"gravity": 1.62},
+    "wind": {"option.gravity": "0.5 0 -9.8"},
+}
+"""What stands in the files, as edits of the reference; "on the command line" in their comments."""
+
+SAID = {
+    "long": ["com distance 1 instead of 0.5", "inertia 0.0333333 instead of 0.00833333"],
+    "short": ["com distance 0.2 instead of 0.5", "inertia 0.00133333 instead of 0.00833333"],
+    "heavy": ["pole mass 1 instead of 0.1", "inertia 0.0833333 instead of 0.00833333"],
+    "damped": ["hinge damping 0.05 instead of 0"],
+    "friction": ["friction loss in joint 'slider'"],
+    "moon": ["gravity 1.62 instead of 9.8"],
+    "wind": ["gravity is not vertical (0.5 0 -9.8)"],
+    "stops": ["limit of joint 'slider' at -1.5 and 1.5"],
+    "bob": [
+        "pole mass 0.2 instead of 0.1",
+        "com distance 0.75 instead of 0.5",
+        "inertia 0.0209773 instead of 0.00833333",
+    ],
+}
+BEYOND = {"friction", "wind", "stops"}
+
+gallery = pytest.mark.parametrize("name", sorted(SAID))
+
+
+def test_the_gallery_is_complete():
+    assert set(SAID) <= set(model_names())
+
+
+@gallery
+def test_each_says_what_it_changes(name):
+    cartpole = load_model(name)
+    assert cartpole.model.names.startswith(name.encode() + b"\0")
+    assert differs_from(cartpole) == SAID[name]
+    header = cartpole.xml.partition("-->")[0]
+    for word in (f"{name}.xml:", "Changed from cartpole.xml", "What it teaches", "Training:"):
+        assert word in header
+    assert "CHANGED" in cartpole.xml.partition("-->")[2]
+
+
+@pytest.mark.parametrize("name", sorted(EDITS))
+def test_each_is_what_its_edit_makes(name):
+    text = edit_document(REFERENCE, {**EDITS[name], "mujoco.model": name})
+    assert describe_edits(load_model(name).xml, text) == []
+    assert same_model(load_model(text).model, load_model(name).model)
+
+
+@gallery
+def test_each_steps(name):
+    for integrator in ("gym", "mujoco"):
+        simulation = Simulation(load_model(name), integrator)
+        simulation.state = (0.0, 0.1, 0.02, 0.0)
+        for _ in range(20):
+            state = simulation.step(1.0)
+        assert np.isfinite(state).all()
+        assert state[0] > 0.1
+
+
+@gallery
+def test_each_moves_as_its_own_equations_do(name):
+    results = list(run_ladder(Subject(load_model(name), "itself", quick=True), (1, 2, 3, 4, 5)))
+    allowed = {"holds", "skipped", "beyond"} if name in BEYOND else {"holds", "skipped"}
+    assert {result.verdict for result in results} <= allowed
+    assert results[0].verdict == results[4].verdict == "holds"
+
+
+def test_friction_holds_a_cart_that_is_not_pushed_hard():
+    simulation = Simulation(load_model("friction"))
+    for _ in range(20):
+        state = simulation.step(0.15)  # 1.5 N of the 2 N
+    assert 0 < state[0] < 2e-3  # it creeps with 3 mm/s
+
+
+def test_the_wind_pushes_a_cart_that_is_let_go():
+    simulation = Simulation(load_model("wind"))
+    assert simulation.step(0.0)[1] == pytest.approx(0.02 * 0.5, rel=1e-9)
+    leaning = (0.0, 0.0, np.arctan2(0.5, -9.8) - np.pi, 0.0)
+    accelerations = simulation.accelerations(np.array([leaning]), np.array([-0.055]))
+    np.testing.assert_allclose(accelerations, 0, atol=1e-9)
+
+
+def test_the_stops_stop_the_cart():
+    simulation = Simulation(load_model("stops"))
+    places = [simulation.step(1.0)[0] for _ in range(200)]
+    simulation.state = (1.45, 1.0, 0.0, 0.0)
+    assert min(simulation.step(0.0)[1] for _ in range(20)) == pytest.approx(-0.4, abs=0.05)
+    assert 1.5 < max(places) < 1.65  # it arrives with 5 m/s
+
+
+@gallery
+def test_every_file_names_settings_that_exist(name):
+    (line,) = re.findall(r"Training: .*?\n\n", load_model(name).xml, flags=re.DOTALL)
+    assert re.search(r"\d+\.\d", line)
+    TrainConfig(model=str(models_folder() / f"{name}.xml"), **settings_of(line))
+
+
+def settings_of(text):
+    """The settings in a file's comment, such as "episodes 3000, gamma 0.99, bins 1 3 6 12"."""
+    found = {}
+    for word, values in re.findall(r"(episodes|gamma|bins) ([\d. ]*\d)", text):
+        numbers = [float(value) if "." in value else int(value) for value in values.split()]
+        found[word] = tuple(numbers) if word == "bins" else numbers[0]
+    return found
+
+
+@pytest.mark.slow
+@gallery
+def test_recommended_settings_solve_it(name):
+    from mjcartpole.learning.training import train
+
+    (line,) = re.findall(r"Training: .*?\n\n", load_model(name).xml, flags=re.DOTALL)
+    scores = []
+    for seed in range(5):
+        policy = train(TrainConfig(model=name, seed=seed, **settings_of(line))).policy
+        scores.append(evaluate(policy, model=name, episodes=100).returns.mean())
+    assert np.mean(scores) >= 495
