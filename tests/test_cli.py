@@ -126,6 +126,7 @@ def frames_of(path):
 @pytest.mark.parametrize("backend", ["mujoco", "gym"])
 def test_rendering_either_backend(run, backend, capsys):
     arguments = ["render", run, "-o", "out.mp4", "--backend", backend, "--seed", "2"]
+    arguments += ["--size", "160x120"]
     code, out, err = call(arguments, capsys)
     assert (code, err) == (0, "")
     steps = int(re.search(r"\((\d+) steps", out)[1])
@@ -160,7 +161,7 @@ BAD = [
     (["train", "--model", "cartpol"], "did you mean 'cartpole'"),
     (["train", "--model", "nowhere.xml"], "'nowhere.xml' is not there"),
     (["train", "--model", "broken.xml"], "line 3"),
-    (["train", "--model", "ball.xml"], "no hinge joint"),
+    (["train", "--model", "ball.xml"], "a ball joint"),
     (["train", "--run-dir", "/proc/nothing"], "cannot make the folder"),
     (["train", "--run-dir", "full"], "holds other files"),
     (["train", "--run-dir", "a-file"], "a-file"),
@@ -186,8 +187,10 @@ BAD = [
     (["render", "RUN", "-o", "video.xyz"], "video.xyz"),
     (["render", "RUN", "-o", "/proc/nothing/video.mp4"], "/proc/nothing"),
     (["render", "RUN", "--camera", "moon"], "'moon'; available: side, follow"),
-    (["render", "RUN", "--width", "0"], "width"),
-    (["render", "RUN", "--height", "481"], "481"),
+    (["render", "RUN", "--size", "0x480"], "width 0 is no size of a picture"),
+    (["render", "RUN", "--size", "640"], "such as 640x480, not '640'"),
+    (["render"], "RUN-OR-POLICY"),
+    (["doctor", "--now"], "--now"),
 ]
 
 
@@ -261,7 +264,23 @@ def test_a_reader_that_leaves_early_is_no_error(here):
     assert process.wait(timeout=60) == 0
 
 
-@pytest.mark.parametrize("command", [[], ["--help"], ["train", "--help"], ["evaluate", "-h"]])
+def test_the_doctor_says_what_draws_and_what_encodes(here, capsys):
+    code, out, err = call(["doctor"], capsys)
+    assert (code, err) == (0, "")
+    code, as_json, err = call(["doctor", "--json"], capsys)
+    assert (code, err) == (0, "")
+    report = json.loads(as_json)
+    assert f"frames are drawn by {report['renderer']};" in out
+    for one in report["backends"]:
+        state = "works" if one["works"] else "does not work"
+        assert re.search(rf"^  {one['name']} +{state}", out, re.M)
+    assert not list(here.iterdir())
+
+
+HELP = [[], ["--help"], ["train", "--help"], ["evaluate", "-h"], ["render", "-h"], ["doctor", "-h"]]
+
+
+@pytest.mark.parametrize("command", HELP)
 def test_help(command, capsys):
     code, out, _ = call(command, capsys)
     assert code == 0

@@ -29,6 +29,7 @@ from mjcartpole.flags import (
     Train,
 )
 from mjcartpole.learning.config import TrainConfig
+from mjcartpole.signals import Interrupted, StopSignals
 
 INTERRUPTED = 130
 COMMANDS = ("train", "evaluate", "render", "parity", "doctor", "model")
@@ -61,6 +62,7 @@ def _run(argv: list[str]) -> int:
         return 0
     command = parse(argv or ["--help"])
     _report_to_stderr()
+    _import_mujoco()
     calls: dict[type, Callable[[Any], int]] = {
         Train: _train,
         Evaluate: _evaluate,
@@ -72,7 +74,20 @@ def _run(argv: list[str]) -> int:
     return calls[type(command)](command)
 
 
-# Each imports what it needs, since that imports MuJoCo, SciPy or Numba.
+def _import_mujoco() -> None:
+    """Import what each command needs; MuJoCo's modules lose an interrupt that comes meanwhile.
+
+    Raises:
+        Interrupted: One came.
+    """
+    signals = StopSignals()
+    with signals.caught(), signals.deferred():
+        from mjcartpole import commands  # noqa: F401, PLC0415
+    if signals.stop():
+        raise Interrupted(number=signals.number)
+
+
+# Each imports what else it needs: MuJoCo, SciPy and Numba are not for `--help`.
 
 
 def _evaluate(command: Evaluate) -> int:

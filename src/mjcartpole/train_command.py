@@ -199,7 +199,7 @@ def _conduct(
         print_evaluation(greedy)
         print(f"\nrun    {folder}", flush=True)
         if how.video:
-            _film_result(result, cartpole, folder, summary)
+            _film_result(result, cartpole, folder, summary, signals)
         runs.finish_run(folder)
     except Interrupted as interrupted:
         raise Interrupted(
@@ -216,7 +216,11 @@ def _kept(folder: Path) -> str:
 
 
 def _film_result(
-    result: TrainResult, cartpole: CartPole, folder: Path, summary: dict[str, Any]
+    result: TrainResult,
+    cartpole: CartPole,
+    folder: Path,
+    summary: dict[str, Any],
+    signals: StopSignals,
 ) -> None:
     config = result.config
     stage = Stage(
@@ -227,7 +231,7 @@ def _film_result(
         integrator=config.integrator,
     )
     path = VIDEOS / f"{stage.name}.mp4"
-    film([play(stage)], Look(), path)
+    film([play(stage)], Look(), path, signals)
     summary["video"] = str(path)
     runs.write_summary(folder, summary)
 

@@ -299,7 +299,6 @@ def test_diverging_physics_stop_both_engines_at_the_same_step(
     assert found["error"].startswith(f"episode {done + 1:,}, step ")
     assert f"the simulation of {model} diverged: (x, x_dot, theta, theta_dot) = (" in found["error"]
     # It has to be NaN itself, or finite and huge: in both ways the engines must see it.
-    assert "NaN" not in name or integrator == "mujoco" or "nan" in found["error"]
 
 
 @pytest.mark.parametrize("name", list(DIVERGING))

@@ -1,0 +1,148 @@
+"""How far a parameter may move."""
+
+import doctest
+import json
+
+import numpy as np
+import pytest
+
+from mjcartpole.errors import ConfigError, ModelError
+from mjcartpole.learning.discretizer import Discretizer
+from mjcartpole.learning.policy import Policy
+from mjcartpole.physics.edit import edit_document
+from mjcartpole.physics.model import load_model
+from mjcartpole.studies import sweep as module
+from mjcartpole.studies.evaluation import evaluate
+from mjcartpole.studies.sweep import Stretch, SweepResult, parse_sweep, sweep
+from mjcartpole.studies.transfer import Cell, TransferResult
+
+
+def a_policy():
+    """Pushes to where the pole is falling to; holds for some lengths only."""
+    grid = Discretizer((1, 3, 6, 8), (-2.4, -0.75, -0.2095, -1.5), (2.4, 0.75, 0.2095, 1.5))
+    parts = (w * np.linspace(-1, 1, n) for w, n in zip((0, 1, 4, 4), grid.bins, strict=True))
+    lean = sum(np.ix_(*parts))
+    return Policy(grid, np.stack([-lean, lean], axis=-1))
+
+
+POLICY = {"p": a_policy()}
+
+
+@pytest.mark.parametrize(
+    ("text", "key", "values"),
+    [
+        ("pole.length=0.5:3:0.25", "pole.length", tuple(0.5 + 0.25 * n for n in range(11))),
+        ("gravity=1:2:0.4", "gravity", (1.0, 1.4, 1.8)),
+        ("joint:hinge.damping=0:0.3:0.1", "joint:hinge.damping", (0.0, 0.1, 0.2, 0.3)),
+        ("x = 1 : 1 : 5", "x", (1.0,)),
+        ("x=-1:1:1", "x", (-1.0, 0.0, 1.0)),
+        ("x=1e-3:2e-3:1e-3", "x", (0.001, 0.002)),
+    ],
+)
+def test_parsed(text, key, values):
+    assert parse_sweep(text) == (key, values)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "pole.length",
+        "pole.length=1",
+        "pole.length=1:2",
+        "pole.length=1:2:3:4",
+        "pole.length=a:b:c",
+        "pole.length=1:2:0",
+        "pole.length=1:2:-1",
+        "pole.length=2:1:0.5",
+        "pole.length=nan:1:1",
+        "pole.length=0:inf:1",
+        "=1:2:1",
+        "",
+    ],
+)
+def test_refused(text):
+    with pytest.raises(ConfigError, match="is no sweep"):
+        parse_sweep(text)
+
+
+def test_too_many_values_are_refused():
+    with pytest.raises(ConfigError, match="at most 1,000"):
+        parse_sweep("pole.length=0:1e9:1e-9")
+
+
+def test_each_value_is_the_edited_model_alone():
+    found = sweep(POLICY, "cartpole", "pole.length", (0.3, 1.0), episodes=10, seed=3)
+    assert (found.key, found.values, found.model) == ("pole.length", (0.3, 1.0), "cartpole")
+    for value, cell in found.points():
+        document = edit_document(load_model("cartpole").xml, {"pole.length": value})
+        alone = evaluate(POLICY["p"], model=load_model(document), episodes=10, seed=3)
+        assert cell.evaluation == alone
+    again = sweep(POLICY, "cartpole", "pole.length", (0.3, 1.0), episodes=10, seed=3, workers=1)
+    assert again.summary() == found.summary()
+    summary = json.loads(json.dumps(found.summary(), allow_nan=False))
+    assert [point["value"] for point in summary["points"]] == [0.3, 1.0]
+    assert {point["model"] for point in summary["points"]} == {"cartpole"}
+
+
+def test_other_edits_hold_for_all_values():
+    heavy = sweep(POLICY, "cartpole", "pole.length", (0.3,), edits={"gravity": 3.0}, episodes=5)
+    document = edit_document(load_model("cartpole").xml, {"pole.length": 0.3, "gravity": 3.0})
+    alone = evaluate(POLICY["p"], model=load_model(document), episodes=5)
+    assert heavy.played.cells[0].evaluation == alone
+
+
+def result_with(*means, values=None):
+    """A sweep with known means, by hand."""
+
+    class Known(Cell):
+        mean = property(lambda self: float(self.error))
+
+    cells = tuple(Known("p", str(n), error=str(mean)) for n, mean in enumerate(means))
+    played = TransferResult(("p",), tuple(str(n) for n in range(len(means))), cells, 0)
+    return SweepResult("k", tuple(values or map(float, range(len(means)))), "m", played)
+
+
+@pytest.mark.parametrize(
+    ("means", "stretches"),
+    [
+        ((500, 475, 474.9), [Stretch(0, 1, True, False)]),
+        ((0, 500, 0), [Stretch(1, 1, False, False)]),
+        ((500, 0, 500, 500), [Stretch(0, 0, True, False), Stretch(2, 3, False, True)]),
+        ((500, 500), [Stretch(0, 1, True, True)]),
+        ((0, float("nan"), 1), []),
+        ((500, float("nan"), 500), [Stretch(0, 0, True, False), Stretch(2, 2, False, True)]),
+    ],
+)
+def test_stretches(means, stretches):
+    assert result_with(*means).stretches("p") == stretches
+
+
+def test_the_longest_stretch_is_the_widest():
+    found = result_with(500, 500, 0, 500, 500, values=(1, 2, 3, 4, 9)).longest("p")
+    assert (found.low, found.high) == (4, 9)
+    assert str(found) == "4 to 9 (where it ends)"
+    assert result_with(0, 0).longest("p") is None
+
+
+@pytest.mark.parametrize(
+    ("arguments", "match"),
+    [
+        (("gym", "pole.length", (1.0,)), "cannot be swept"),
+        (("cartpole", "pole.length", ()), "rising values"),
+        (("cartpole", "pole.length", (2.0, 1.0)), "rising values"),
+        (("cartpole", "pole.lenght", (1.0,)), "pole.length"),
+        (("cartpole", "pole.length", (-1.0, 1.0)), "pole.length"),
+    ],
+)
+def test_refused_sweeps(arguments, match):
+    with pytest.raises((ConfigError, ModelError), match=match):
+        sweep(POLICY, *arguments, episodes=1)
+
+
+def test_one_thing_is_not_set_and_swept():
+    with pytest.raises(ConfigError, match="give it once"):
+        sweep(POLICY, "cartpole", "gravity", (1.0,), edits=["gravity=2"], episodes=1)
+
+
+def test_doctests():
+    assert doctest.testmod(module).failed == 0
