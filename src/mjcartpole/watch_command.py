@@ -40,6 +40,8 @@ EVALUATED: Final = 50
 """Greedy episodes."""
 PATIENCE: Final = 6.0
 """Seconds that a training may take at most, if need be with fewer episodes."""
+FPS: Final = 25.0
+"""Frames per second of the video."""
 _TRIAL: Final = 0.5
 """Seconds of training after which it is known how long the rest will take."""
 _LEAST_EPISODES: Final = 20
@@ -309,12 +311,12 @@ def _film(
 ) -> None:
     take = play(stage)[0]
     check()
-    # Shadows and smooth edges would cost more time than all the rest.
-    look = Look(camera=camera, quality="draft")
+    # Shadows and smooth edges would cost more time than all the rest, a sky nearly as much.
+    look = Look(camera=camera, quality="draft", fps=FPS)
     # A signal raised in the midst of OpenGL would be lost: it is looked at between frames.
     with signals.deferred(), Film([[take]], look) as film:
         with contextlib.closing(_checked(film, check, signals)) as frames:
-            video = write_video(path, frames)
+            video = write_video(path, frames, fps=FPS)
         drawn_by = film.drawn_by
     about = f"{take.episode.steps} steps, {take.episode.ending}"
     _say("video", f"{video.path} ({about}; drawn by {drawn_by})")

@@ -227,12 +227,15 @@ def test_a_window_takes_no_size():
         CartPoleEnv(render_mode="human", width=320)
 
 
-def test_a_model_without_our_cameras_can_be_stepped():
-    env = CartPoleEnv(model=REFERENCE.replace('name="side"', 'name="mine"'))
+def test_a_model_without_our_cameras_can_be_stepped_and_drawn():
+    model = REFERENCE.replace('name="side"', 'name="mine"')
+    env = CartPoleEnv(model=model, render_mode="rgb_array")
     env.reset(seed=0)
     assert env.step(1)[1] == 1.0
+    assert env.render().std() > 0
+    env.close()
     with pytest.raises(RenderError, match="available: mine, follow"):
-        CartPoleEnv(model=env.simulation.cartpole, render_mode="rgb_array")
+        CartPoleEnv(model=model, render_mode="rgb_array", camera="follows")
 
 
 def test_rendering_without_a_mode_warns():
