@@ -27,12 +27,14 @@ from mjcartpole.flags import (
     Played,
     Render,
     Train,
+    Transfer,
+    Watch,
 )
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.signals import Interrupted, StopSignals
 
 INTERRUPTED = 130
-COMMANDS = ("train", "evaluate", "render", "parity", "doctor", "model")
+COMMANDS = ("train", "evaluate", "render", "parity", "doctor", "model", "transfer", "watch")
 
 
 class UsageError(MjCartPoleError):
@@ -70,6 +72,8 @@ def _run(argv: list[str]) -> int:
         Parity: _parity,
         Doctor: _examine,
         Model: _model,
+        Transfer: _transfer,
+        Watch: _watch,
     }
     return calls[type(command)](command)
 
@@ -130,6 +134,38 @@ def _examine(command: Doctor) -> int:
     report = doctor.examine()
     print(json.dumps(report.as_dict(), indent=2) if command.json else report.text())
     return 0
+
+
+def _transfer(command: Transfer) -> int:
+    from mjcartpole import transfer_command  # noqa: PLC0415
+
+    if not command.sources:
+        raise UsageError("transfer needs a RUN-OR-POLICY; see mjcartpole transfer --help")
+    return transfer_command.run_transfer(
+        command.sources,
+        models=command.models,
+        edits=command.set,
+        swept=command.sweep,
+        integrator=command.integrator,
+        episodes=command.episodes,
+        seed=command.seed,
+        workers=command.workers,
+        output=command.output,
+    )
+
+
+def _watch(command: Watch) -> int:
+    from mjcartpole import watch_command  # noqa: PLC0415
+
+    return watch_command.run_watch(
+        command.file,
+        preset=command.preset,
+        episodes=command.episodes,
+        integrator=command.integrator,
+        seed=command.seed,
+        video=command.video,
+        once=command.once,
+    )
 
 
 def _train(command: Train) -> int:
@@ -242,6 +278,8 @@ def parse(argv: Sequence[str]) -> Command:
         | Annotated[Parity, tyro.conf.subcommand("parity")]
         | Annotated[Doctor, tyro.conf.subcommand("doctor")]
         | Annotated[Model, tyro.conf.subcommand("model")]
+        | Annotated[Transfer, tyro.conf.subcommand("transfer")]
+        | Annotated[Watch, tyro.conf.subcommand("watch")]
     )
     complaint = io.StringIO()
     try:

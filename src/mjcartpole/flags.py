@@ -13,7 +13,7 @@ from mjcartpole.envs.backend import Backend
 from mjcartpole.integrator import Integrator
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.engine import Engine
-from mjcartpole.studies.evaluation import EPISODES
+from mjcartpole.studies.evaluation import EPISODES, SEED
 
 Against = Literal["cartpole-v1", "itself"]
 Quality = Literal["draft", "normal", "high"]
@@ -146,4 +146,50 @@ class Model:
     """The file that edit writes."""
 
 
-Command = Train | Evaluate | Render | Parity | Doctor | Model
+@dataclass(frozen=True)
+class Transfer:
+    """Play policies on models they were not trained on; or see how far a number can move."""
+
+    sources: Annotated[
+        tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="RUN-OR-POLICY …")
+    ] = tyro.MISSING
+    """Run folders or policy files."""
+    models: tuple[str, ...] = ()
+    """Names or files of models, and gym for gymnasium's own; all there are if left out."""
+    set: tuple[str, ...] = ()
+    """Edits of every model, such as pole.length=1.5 or joint:hinge.damping=0.1."""
+    sweep: str | None = None
+    """An edit over a range, such as pole.length=0.5:3:0.25, on one model."""
+    integrator: Integrator = "gym"
+    """gym: explicit Euler, as CartPole-v1; mujoco: the integrator that the model's file names."""
+    episodes: int = EPISODES
+    """Greedy episodes of each policy on each model."""
+    seed: int = SEED
+    """Seeds the starting states."""
+    workers: int | None = None
+    """How many evaluations at once; as many as there are cores if left out."""
+    output: Annotated[Path, tyro.conf.arg(aliases=["-o"])] = Path("transfer")
+    """Folder for the table, the JSON and the picture."""
+
+
+@dataclass(frozen=True)
+class Watch:
+    """On every save of a model's file: check it, prove it, train on it, film it."""
+
+    file: Annotated[Path, tyro.conf.Positional]
+    """An MJCF file."""
+    preset: str = "tuned"
+    """How to train."""
+    episodes: int | None = None
+    """Episodes to train; the preset's if left out."""
+    integrator: Integrator = "gym"
+    """gym: explicit Euler, as CartPole-v1; mujoco: the integrator that the file names."""
+    seed: int = 0
+    """Seeds the training."""
+    video: bool = True
+    """Film it."""
+    once: int | None = None
+    """End after this many saves, the first look included."""
+
+
+Command = Train | Evaluate | Render | Parity | Doctor | Model | Transfer | Watch
