@@ -1,5 +1,7 @@
 """What all tests share."""
 
+import signal
+
 import pytest
 
 from mjcartpole.physics.simulation import silence_mujoco
@@ -9,3 +11,8 @@ from mjcartpole.physics.simulation import silence_mujoco
 def _quiet_mujoco():
     """Some tests diverge on purpose: no words on stderr, no log file where pytest runs."""
     silence_mujoco()
+
+
+def pytest_configure():
+    """Hear Ctrl-C, also where the tests run in the background, which starts with it ignored."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
