@@ -37,7 +37,7 @@ class Train:
     engine: Engine = "compiled"
     """Who runs the loop; both give the same bits."""
     seeds: int = 1
-    """Train this many seeds from --seed on, side by side, and print statistics over them."""
+    """Train this many seeds from --seed on, side by side, for statistics; nothing is filmed."""
     workers: int | None = None
     """How many seeds at once; as many as there are cores if left out."""
     checkpoint_every: float = 30.0
