@@ -139,8 +139,6 @@ def _examine(command: Doctor) -> int:
 def _transfer(command: Transfer) -> int:
     from mjcartpole import transfer_command  # noqa: PLC0415
 
-    if not command.sources:
-        raise UsageError("transfer needs a RUN-OR-POLICY; see mjcartpole transfer --help")
     return transfer_command.run_transfer(
         command.sources,
         models=command.models,

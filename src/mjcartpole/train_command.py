@@ -23,6 +23,7 @@ from mjcartpole.learning import runs, tensorboard
 from mjcartpole.learning.checkpoints import LATEST
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.engine import Engine
+from mjcartpole.learning.folders import free_folder, locked_folder
 from mjcartpole.learning.session import CHECKPOINT_EVERY, Session, check_interval
 from mjcartpole.learning.training import Training, TrainResult
 from mjcartpole.physics.model import CartPole, load_model
@@ -76,7 +77,7 @@ class Where:
 
     def folder(self, name: str) -> Path:
         """The run's folder."""
-        return self.run_dir or runs.free_folder(RUNS, f"{self.preset}-{name}")
+        return self.run_dir or free_folder(RUNS, f"{self.preset}-{name}")
 
 
 def run_train(config: TrainConfig, how: How, where: Where) -> int:
@@ -116,7 +117,7 @@ def run_resume(path: Path, how: How) -> int:
         raise ConfigError("--workers is for several --seeds")
     folder = runs.run_folder(path)
     if path.is_dir() and runs.is_complete(folder):
-        with runs.locked_folder(folder):
+        with locked_folder(folder):
             pass  # A lock that a killed training has left goes.
         print(f"{folder} is complete: nothing is left to do")
         return 0

@@ -7,7 +7,7 @@ import json
 import pytest
 
 from mjcartpole.errors import CheckpointError, FileError, ModelError, PolicyFileError, RunError
-from mjcartpole.learning import runs
+from mjcartpole.learning import folders, runs
 from mjcartpole.learning.checkpoints import LATEST, PREVIOUS
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.session import Session
@@ -85,10 +85,10 @@ def test_a_file_in_the_way(tmp_path):
 
 
 def test_free_folders_are_counted(tmp_path):
-    assert runs.free_folder(tmp_path, "a").name == "a"
+    assert folders.free_folder(tmp_path, "a").name == "a"
     (tmp_path / "a").mkdir()
     (tmp_path / "a-2").mkdir()
-    assert runs.free_folder(tmp_path, "a").name == "a-3"
+    assert folders.free_folder(tmp_path, "a").name == "a-3"
 
 
 @pytest.mark.parametrize("name", [runs.CONFIG, runs.MODEL, runs.POLICY])
@@ -208,7 +208,7 @@ def test_a_folder_is_locked_once(begun):
         with pytest.raises(RunError, match="in use by another training"):
             runs.remove_run(begun)
     resumed(begun)
-    assert not (begun / runs.LOCK).exists()
+    assert not (begun / folders.LOCK).exists()
 
 
 def test_a_run_is_complete_when_its_checkpoints_are_gone(begun, result):
@@ -240,7 +240,9 @@ def test_beginning_again_mixes_nothing_with_the_older_run(begun, result):
     (begun / "events.out.tfevents.1.x").write_text("of the older run")
     with runs.claimed_folder(begun, overwrite=True):
         runs.begin_run(begun, result.config, load_model(), preset="tuned")
-        assert sorted(path.name for path in begun.iterdir()) == sorted([*runs.BEGINNING, runs.LOCK])
+        assert sorted(path.name for path in begun.iterdir()) == sorted(
+            [*runs.BEGINNING, folders.LOCK]
+        )
 
 
 def test_removing_a_run_removes_nothing_else(begun):
@@ -259,11 +261,11 @@ def test_what_a_kill_in_the_first_moment_leaves_is_no_obstacle(left, tmp_path, r
     for name in left:
         (tmp_path / name).write_text("left by a kill")
     (tmp_path / ".model-0123abcd.xml").write_text("left by a kill")
-    (tmp_path / runs.LOCK).write_text("")
+    (tmp_path / folders.LOCK).write_text("")
     with runs.claimed_folder(tmp_path):
         runs.begin_run(tmp_path, result.config, load_model(), preset="article")
         assert sorted(path.name for path in tmp_path.iterdir()) == sorted(
-            [*runs.BEGINNING, runs.LOCK]
+            [*runs.BEGINNING, folders.LOCK]
         )
 
 

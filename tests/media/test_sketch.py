@@ -192,7 +192,8 @@ def test_a_camera_inside_of_a_shape_or_touching_it_does_no_harm(kind, projection
     for y in (-3.0, -2.99, -3.5, -2.5):
         inside = f'<geom type="{kind}" size="0.5 0.5 0.5" pos="0 {y} 0" {RED}/>'
         far = f'<geom type="box" size="0.3 0.1 0.3" {BLUE}/>'
-        draw(shapes(far, inside, document), theta=0.3)
+        frame = draw(shapes(far, inside, document), theta=0.3)
+        assert frame.shape == (200, 200, 3)
 
 
 def test_a_shape_that_reaches_behind_the_camera_is_cut():

@@ -5,7 +5,7 @@ import json
 import pytest
 
 from mjcartpole.errors import FileError, RunError
-from mjcartpole.learning import runs
+from mjcartpole.learning import folders, runs
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.physics.model import load_model, same_model
 from mjcartpole.studies import seed_runs
@@ -54,7 +54,7 @@ def test_what_was_begun_comes_back(tmp_path):
         assert begun.cartpole.name == "cartpole"
         with pytest.raises(RunError, match="in use by another training"):
             claim(tmp_path / "many", overwrite=True)
-    assert not (tmp_path / "many" / runs.LOCK).exists()
+    assert not (tmp_path / "many" / folders.LOCK).exists()
 
 
 def test_the_table_and_the_figures(tmp_path):
@@ -118,7 +118,7 @@ def test_files_of_somebody_else_are_never_taken(names, overwrite, tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == names
 
 
-@pytest.mark.parametrize("left", [runs.LOCK, ".seeds-0123abcd.json", ".model-0123abcd.xml"])
+@pytest.mark.parametrize("left", [folders.LOCK, ".seeds-0123abcd.json", ".model-0123abcd.xml"])
 def test_what_a_kill_in_the_first_moment_leaves_is_no_obstacle(left, tmp_path):
     (tmp_path / left).write_text("")
     train_in(tmp_path)

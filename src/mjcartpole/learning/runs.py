@@ -22,13 +22,9 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any, Final
 
-import filelock
-
-from mjcartpole.errors import CheckpointError, ConfigError, FileError, ModelError, RunError
+from mjcartpole.errors import CheckpointError, ConfigError, ModelError, RunError
 from mjcartpole.files import (
-    check_writable,
     is_temporary,
-    make_folder,
     remove_leftovers,
     write_whole,
 )
@@ -41,6 +37,7 @@ from mjcartpole.learning.checkpoints import (
 )
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.episodes import ENDINGS, EpisodeLog
+from mjcartpole.learning.folders import LOCK, held_folder, locked_folder
 from mjcartpole.learning.policy import Policy
 from mjcartpole.learning.training import TrainResult
 from mjcartpole.physics.model import CartPole, load_model, same_model
@@ -51,7 +48,6 @@ BEGINNING: Final = (VERSIONS, MODEL, CONFIG)
 """In the order of writing: what a kill leaves of them is known by the versions."""
 RESULTS: Final = (EPISODES, POLICY, TIMING, SUMMARY)
 FILES: Final = (*BEGINNING, *RESULTS)
-LOCK: Final = ".lock"
 EVENTS: Final = "events.out.tfevents.*"
 """TensorBoard's (see tensorboard.py)."""
 
@@ -101,15 +97,6 @@ class Begun:
     checkpoint: Checkpoint | None
 
 
-def free_folder(parent: Path, name: str) -> Path:
-    """The first of `parent/name`, `parent/name-2`, `parent/name-3` … that is not there."""
-    folder, number = parent / name, 1
-    while folder.exists():
-        number += 1
-        folder = parent / f"{name}-{number}"
-    return folder
-
-
 @contextlib.contextmanager
 def claimed_folder(folder: Path, *, overwrite: bool = False) -> Iterator[None]:
     """Hold a folder for a new run, before the work begins.
@@ -125,47 +112,14 @@ def claimed_folder(folder: Path, *, overwrite: bool = False) -> Iterator[None]:
         FileError: The folder cannot be made or written.
     """
     _check_free(folder, overwrite)
-    make_folder(folder)
-    check_writable(folder)
-    try:
-        with locked_folder(folder):
-            _check_free(folder, overwrite)
-            remove_leftovers(folder)
-            before = content_of(folder)
-            try:
-                yield
-            finally:
-                if not before and not {LATEST, PREVIOUS, *RESULTS} & content_of(folder):
-                    _remove(folder, reversed(BEGINNING))
-    finally:
-        with contextlib.suppress(OSError):
-            folder.rmdir()  # Only an empty one goes.
-
-
-@contextlib.contextmanager
-def locked_folder(folder: Path) -> Iterator[None]:
-    """Keep other trainings out of a folder, for as long as this process lives.
-
-    Raises:
-        RunError: Another training is at work in it.
-        FileError: The folder cannot be written.
-    """
-    lock = filelock.FileLock(folder / LOCK)
-    try:
-        lock.acquire(timeout=0)
-    except filelock.Timeout:
-        raise RunError(
-            f"run folder '{folder}' is in use by another training; wait for its end, or choose "
-            "another --run-dir"
-        ) from None
-    except OSError as error:
-        raise FileError(f"cannot lock '{folder}': {error.strerror or error}") from error
-    try:
-        yield
-    finally:
-        with contextlib.suppress(OSError):
-            (folder / LOCK).unlink()
-        lock.release()
+    with held_folder(folder):
+        _check_free(folder, overwrite)
+        before = content_of(folder)
+        try:
+            yield
+        finally:
+            if not before and not {LATEST, PREVIOUS, *RESULTS} & content_of(folder):
+                _remove(folder, reversed(BEGINNING))
 
 
 def check_storable(cartpole: CartPole) -> None:
@@ -320,6 +274,15 @@ def resumed_folder(path: Path) -> Iterator[Begun]:
         yield begun
 
 
+def stored_model(document: str, config: TrainConfig) -> CartPole:
+    """The model of a run from the document that it stores, under the name that was trained on.
+
+    Raises:
+        ModelError: The document was damaged.
+    """
+    return dataclasses.replace(load_model(document), name=config.model)
+
+
 def _load_begun(folder: Path, path: Path) -> Begun:
     if not (folder / CONFIG).is_file():
         raise RunError(
@@ -332,7 +295,7 @@ def _load_begun(folder: Path, path: Path) -> Begun:
     except (OSError, UnicodeDecodeError) as error:
         raise RunError(f"'{folder / MODEL}' cannot be read: {error}") from error
     checkpoint = _checkpoint(folder, path, config, document)
-    cartpole = dataclasses.replace(load_model(document), name=config.model)
+    cartpole = stored_model(document, config)
     return Begun(folder, preset, video, config, cartpole, checkpoint)
 
 

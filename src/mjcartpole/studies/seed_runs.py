@@ -17,10 +17,11 @@ from pathlib import Path
 from typing import Any, Final
 
 from mjcartpole.errors import ConfigError, ModelError, RunError
-from mjcartpole.files import check_writable, make_folder, remove_leftovers, write_whole
+from mjcartpole.files import remove_leftovers, write_whole
 from mjcartpole.learning import runs
 from mjcartpole.learning.config import TrainConfig
-from mjcartpole.physics.model import CartPole, load_model
+from mjcartpole.learning.folders import held_folder, locked_folder
+from mjcartpole.physics.model import CartPole
 from mjcartpole.studies.seeds import ManyResult
 
 SEEDS, TABLE, AGGREGATE = "seeds.json", "seeds.csv", "aggregate.json"
@@ -58,17 +59,11 @@ def claimed_seeds(folder: Path, *, overwrite: bool = False) -> Iterator[None]:
         FileError: The folder cannot be made or written.
     """
     _check_free(folder, overwrite)
-    make_folder(folder)
-    check_writable(folder)
-    try:
-        with runs.locked_folder(folder):
-            if (folder / SEEDS).exists():
-                _clear(folder)
-            remove_leftovers(folder)
-            yield
-    finally:
-        with contextlib.suppress(OSError):
-            folder.rmdir()  # Only an empty one goes.
+    with held_folder(folder):
+        _check_free(folder, overwrite)
+        if (folder / SEEDS).exists():
+            _clear(folder)
+        yield
 
 
 def begin_seeds(
@@ -92,7 +87,7 @@ def resumed_seeds(folder: Path) -> Iterator[ManyBegun]:
     Raises:
         RunError: It is damaged, or another training is at work in it.
     """
-    with runs.locked_folder(folder):
+    with locked_folder(folder):
         remove_leftovers(folder)
         yield _load(folder)
 
@@ -153,10 +148,11 @@ def _load(folder: Path) -> ManyBegun:
         about: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
         config = TrainConfig(**about["config"])
         seeds = tuple(int(seed) for seed in about["seeds"])
-        cartpole = load_model((folder / runs.MODEL).read_text(encoding="utf-8"))
+        document = (folder / runs.MODEL).read_text(encoding="utf-8")
+        cartpole = runs.stored_model(document, config)
         preset = str(about["preset"])
     except (OSError, ValueError, TypeError, KeyError, ConfigError, ModelError) as error:
         raise RunError(
             f"'{path}' does not name the seeds of a run, or is damaged: {error}"
         ) from error
-    return ManyBegun(preset, config, seeds, dataclasses.replace(cartpole, name=config.model))
+    return ManyBegun(preset, config, seeds, cartpole)

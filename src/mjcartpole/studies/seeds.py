@@ -254,7 +254,7 @@ def _train_seed(job: _Job, stop: Callable[[], bool]) -> SeedResult:
 def _model_of(job: _Job) -> CartPole:
     if job.document is None:
         return load_model()
-    return dataclasses.replace(load_model(job.document), name=job.config.model)
+    return runs.stored_model(job.document, job.config)
 
 
 def _train_in_memory(job: _Job, cartpole: CartPole, stop: Callable[[], bool]) -> SeedResult:
