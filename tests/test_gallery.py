@@ -33,6 +33,7 @@ SAID = {
     "moon": ["gravity 1.62 instead of 9.8"],
     "wind": ["gravity is not vertical (0.5 0 -9.8)"],
     "stops": ["limit of joint 'slider' at -1.5 and 1.5"],
+    "twopoles": ["2 poles, and the equations are those of one"],
     "bob": [
         "pole mass 0.2 instead of 0.1",
         "com distance 0.75 instead of 0.5",
@@ -40,8 +41,10 @@ SAID = {
     ],
 }
 BEYOND = {"friction", "wind", "stops"}
+SEVERAL_POLES = {"twopoles"}
 
 gallery = pytest.mark.parametrize("name", sorted(SAID))
+single = pytest.mark.parametrize("name", sorted(set(SAID) - SEVERAL_POLES))
 
 
 def test_the_gallery_is_complete():
@@ -70,19 +73,28 @@ def test_each_is_what_its_edit_makes(name):
 def test_each_steps(name):
     for integrator in ("gym", "mujoco"):
         simulation = Simulation(load_model(name), integrator)
-        simulation.state = (0.0, 0.1, 0.02, 0.0)
+        simulation.state = (0.0, 0.1, *(0.02, 0.0) * simulation.cartpole.poles)
         for _ in range(20):
             state = simulation.step(1.0)
         assert np.isfinite(state).all()
         assert state[0] > 0.1
 
 
-@gallery
+@single
 def test_each_moves_as_its_own_equations_do(name):
     results = list(run_ladder(Subject(load_model(name), "itself", quick=True), (1, 2, 3, 4, 5)))
     allowed = {"holds", "skipped", "beyond"} if name in BEYOND else {"holds", "skipped"}
     assert {result.verdict for result in results} <= allowed
     assert results[0].verdict == results[4].verdict == "holds"
+
+
+def test_each_of_two_poles_is_a_uniform_rod():
+    model = load_model("twopoles").model
+    for name, mass, length in (("long", 0.3, 3.0), ("short", 0.05, 0.5)):
+        body = model.body(name)
+        across = mass * length**2 / 12
+        assert (body.mass[0], body.ipos[2]) == pytest.approx((mass, length / 2), rel=1e-12)
+        assert sorted(body.inertia)[1:] == pytest.approx([across, across], rel=1e-12)
 
 
 def test_friction_holds_a_cart_that_is_not_pushed_hard():
@@ -112,16 +124,18 @@ def test_the_stops_stop_the_cart():
 def test_every_file_names_settings_that_exist(name):
     (line,) = re.findall(r"Training: .*?\n\n", load_model(name).xml, flags=re.DOTALL)
     assert re.search(r"\d+\.\d", line)
-    TrainConfig(model=str(models_folder() / f"{name}.xml"), **settings_of(line))
+    config = config_of(line, model=str(models_folder() / f"{name}.xml"))
+    assert config.discretizer(load_model(name).poles).n_states > 1
 
 
-def settings_of(text):
-    """The settings in a file's comment, such as "episodes 3000, gamma 0.99, bins 1 3 6 12"."""
+def config_of(text, **changes):
+    """The settings in a file's comment: "the preset tuned, episodes 3000, gamma 0.99"."""
     found = {}
     for word, values in re.findall(r"(episodes|gamma|bins) ([\d. ]*\d)", text):
         numbers = [float(value) if "." in value else int(value) for value in values.split()]
         found[word] = tuple(numbers) if word == "bins" else numbers[0]
-    return found
+    (preset, *_) = re.findall(r"preset ([\w-]+)", text)
+    return TrainConfig.preset(preset, **{**found, **changes})
 
 
 @pytest.mark.slow
@@ -132,6 +146,6 @@ def test_recommended_settings_solve_it(name):
     (line,) = re.findall(r"Training: .*?\n\n", load_model(name).xml, flags=re.DOTALL)
     scores = []
     for seed in range(5):
-        policy = train(TrainConfig(model=name, seed=seed, **settings_of(line))).policy
+        policy = train(config_of(line, model=name, seed=seed)).policy
         scores.append(evaluate(policy, model=name, episodes=100).returns.mean())
-    assert np.mean(scores) >= 495
+    assert np.mean(scores) >= (400 if name in SEVERAL_POLES else 495)

@@ -123,7 +123,7 @@ def _model(command: Model) -> int:
         case "list":
             return model_command.run_list()
         case "show":
-            return model_command.run_show(command.name, command.set)
+            return model_command.run_show(command.name, command.set, command.own_timestep)
         case "edit":
             return model_command.run_edit(command.name, command.set, command.output)
 
@@ -145,6 +145,7 @@ def _transfer(command: Transfer) -> int:
         edits=command.set,
         swept=command.sweep,
         integrator=command.integrator,
+        own_timestep=command.own_timestep,
         episodes=command.episodes,
         seed=command.seed,
         workers=command.workers,
@@ -160,6 +161,7 @@ def _watch(command: Watch) -> int:
         preset=command.preset,
         episodes=command.episodes,
         integrator=command.integrator,
+        own_timestep=command.own_timestep,
         seed=command.seed,
         video=command.video,
         once=command.once,
@@ -253,9 +255,8 @@ def _report_to_stderr() -> None:
 
 
 def _choice(command: Played) -> dict[str, Any]:
-    return {
-        name: getattr(command, name) for name in ("backend", "model", "integrator", "seed", "set")
-    }
+    names = ("backend", "model", "integrator", "seed", "set", "own_timestep")
+    return {name: getattr(command, name) for name in names}
 
 
 def parse(argv: Sequence[str]) -> Command:

@@ -8,7 +8,7 @@ from mjcartpole.envs.backend import Backend, check_backend
 from mjcartpole.integrator import Integrator
 from mjcartpole.learning import runs
 from mjcartpole.learning.policy import Policy
-from mjcartpole.physics.model import load_model
+from mjcartpole.physics.model import ModelLike, load_model
 from mjcartpole.physics.simulation import silence_mujoco
 from mjcartpole.studies import evaluation
 from mjcartpole.studies.evaluation import Evaluation, check_count, evaluate
@@ -27,6 +27,7 @@ class Choice:
     integrator: Integrator | None = None
     seed: int | None = None
     set: tuple[str, ...] = ()
+    own_timestep: bool = False
 
 
 def run_evaluate(source: Path, choice: Choice, *, episodes: int, as_json: bool) -> int:
@@ -50,19 +51,23 @@ def set_stage(source: Path, choice: Choice) -> Stage:
     integrator: Integrator
     if source.is_file():
         name, policy = source.stem, Policy.load(source)
-        backend, integrator, model = "mujoco", "gym", "cartpole"
+        backend, integrator, model, own_timestep = "mujoco", "gym", "cartpole", False
     else:
         run = runs.load_run(source)
         name, policy = run.folder.resolve().name, run.policy
         backend, integrator = run.config.backend, run.config.integrator
-        model = str(run.model)
+        model, own_timestep = str(run.model), run.config.own_timestep
     backend = choice.backend or backend
     if backend == "gym":
         # Gymnasium's cart-pole has neither; only what the user asks for is held against that.
-        integrator, model = "gym", "cartpole"
+        integrator, model, own_timestep = "gym", "cartpole", False
     model, integrator = choice.model or model, choice.integrator or integrator
-    check_backend(backend, model, integrator, choice.set)
-    played_on = load_model(model, choice.set) if choice.set else model
+    own = ("own-timestep",) if choice.own_timestep else ()
+    check_backend(backend, model, integrator, (*choice.set, *own))
+    own_timestep = own_timestep or choice.own_timestep
+    played_on: ModelLike = model
+    if choice.set or own_timestep:
+        played_on = load_model(model, choice.set, own_timestep=own_timestep)
     return Stage(name, policy, backend, played_on, integrator, seed)
 
 

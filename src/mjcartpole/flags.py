@@ -25,7 +25,7 @@ class Train:
 
     config: Annotated[TrainConfig, tyro.conf.arg(name=""), tyro.conf.OmitArgPrefixes]
     preset: str = "tuned"
-    """Where the defaults below come from: tuned, article or article-terminal."""
+    """Where the defaults below come from: tuned, article, article-terminal or two-poles."""
     run_dir: Path | None = None
     """Folder for the run; runs/<preset>-<backend>-seed<seed> if left out."""
     video: bool = True
@@ -56,6 +56,8 @@ class Played:
     """Model to play on; the run's own if left out."""
     set: tuple[str, ...] = ()
     """Edits of that model, such as pole.length=1.5 or joint:hinge.damping=0.1."""
+    own_timestep: bool = False
+    """Let a control step be one physics step of that model's file; as a run that was trained so."""
     integrator: Integrator | None = None
     """The run's own if left out."""
     seed: int | None = None
@@ -142,6 +144,8 @@ class Model:
     """A shipped model's name or an MJCF file."""
     set: tuple[str, ...] = ()
     """Edits, such as pole.length=1.5 or joint:hinge.damping=0.1."""
+    own_timestep: bool = False
+    """Let a control step be one physics step of the model's file, instead of 0.02 s."""
     output: Annotated[Path | None, tyro.conf.arg(aliases=["-o"])] = None
     """The file that edit writes."""
 
@@ -162,6 +166,8 @@ class Transfer:
     """An edit over a range, such as pole.length=0.5:3:0.25, on one model."""
     integrator: Integrator = "gym"
     """gym: explicit Euler, as CartPole-v1; mujoco: the integrator that the model's file names."""
+    own_timestep: bool = False
+    """Let a control step be one physics step of a model's file, instead of 0.02 s."""
     episodes: int = EPISODES
     """Greedy episodes of each policy on each model."""
     seed: int = SEED
@@ -184,6 +190,8 @@ class Watch:
     """Episodes to train; the preset's if left out."""
     integrator: Integrator = "gym"
     """gym: explicit Euler, as CartPole-v1; mujoco: the integrator that the file names."""
+    own_timestep: bool = False
+    """Let a control step be one physics step of the file, instead of 0.02 s."""
     seed: int = 0
     """Seeds the training."""
     video: bool = True

@@ -29,10 +29,10 @@ def run_list() -> int:
     return 0
 
 
-def run_show(name: str, edits: Sequence[str]) -> int:
+def run_show(name: str, edits: Sequence[str], own_timestep: bool = False) -> int:
     """Print what was understood of a model, and how it differs from CartPole-v1."""
     silence_mujoco()
-    cartpole = load_model(name, edits)
+    cartpole = load_model(name, edits, own_timestep=own_timestep)
     print(cartpole.name)
     for line in describe(cartpole).text():
         print(f"  {line}")
@@ -50,7 +50,8 @@ def run_edit(base: str, edits: Sequence[str], output: Path | None) -> int:
         raise ConfigError("nothing to edit; give --set NAME=VALUE, such as pole.length=1.5")
     if output is None:
         raise ConfigError("no file to write; give -o FILE.xml")
-    before, after = load_model(base), load_model(base, edits)
+    # Both before the file is written; of a model with an odd timestep too.
+    before, after = (load_model(base, each, own_timestep=True) for each in ((), edits))
     write_whole(output, after.xml)
     print(f"{output}: {base} with")
     for line in describe_edits(before.xml, after.xml):

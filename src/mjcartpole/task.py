@@ -5,6 +5,7 @@ Only the rules: no physics engine, no gymnasium. The numbers are those of gymnas
 """
 
 import math
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
@@ -21,7 +22,7 @@ THETA_LIMIT: Final = 12 * 2 * math.pi / 360
 
 RESET_LOW: Final = -0.05
 RESET_HIGH: Final = 0.05
-"""Each of the four state values starts uniformly between these two."""
+"""Each of the state's values starts uniformly between these two."""
 
 TIME_LIMIT: Final = 500
 """Control steps until an episode is truncated (the registration's business, not the env's)."""
@@ -33,21 +34,44 @@ N_ACTIONS: Final = 2
 """0 pushes to the left (-x), 1 to the right (+x)."""
 
 
-def observation_bound() -> npt.NDArray[np.float32]:
-    """Upper bound of the observation, shape (4,); the lower bound is its negative.
+def state_names(poles: int = 1) -> tuple[str, ...]:
+    """What the values of a state are: m, m/s, then rad and rad/s of each pole.
+
+    >>> state_names(2)
+    ('x', 'x_dot', 'theta1', 'theta1_dot', 'theta2', 'theta2_dot')
+    """
+    angles = ("theta",) if poles == 1 else tuple(f"theta{pole + 1}" for pole in range(poles))
+    names = (name for angle in angles for name in (angle, f"{angle}_dot"))
+    return ("x", "x_dot", *names)
+
+
+def observation_bound(poles: int = 1) -> npt.NDArray[np.float32]:
+    """Upper bound of the observation, shape (2 + 2 poles,); the lower bound is its negative.
 
     Positions may be twice as large as the limits that end an episode, so that the observation of
     the last step still lies inside; velocities are unbounded.
     """
-    return np.array([X_LIMIT * 2, np.inf, THETA_LIMIT * 2, np.inf], dtype=np.float32)
+    angle = [THETA_LIMIT * 2, np.inf]
+    return np.array([X_LIMIT * 2, np.inf, *angle * poles], dtype=np.float32)
 
 
 def has_terminated(x: float, theta: float) -> bool:
     """Whether the cart (m) has left the track or the pole (rad) has fallen.
 
-    The comparison is strict: a state exactly on a limit is still in play.
+    The comparison is strict: a state exactly on a limit is still in play. Of several poles it is
+    the one that leans most.
     """
     return x < -X_LIMIT or x > X_LIMIT or theta < -THETA_LIMIT or theta > THETA_LIMIT
+
+
+def farthest(values: Sequence[float] | npt.NDArray[np.float64]) -> float:
+    """The largest size among values; NaN if one of them is NaN or infinite."""
+    # Comparing would lose a NaN; adding does not.
+    largest, total = 0.0, 0.0
+    for value in values:
+        largest = max(largest, abs(value))
+        total += value
+    return largest + 0.0 * total
 
 
 def reward(terminated: bool, already_over: bool, sutton_barto: bool) -> float:

@@ -26,7 +26,7 @@ from mjcartpole.learning.engine import Engine
 from mjcartpole.learning.folders import free_folder, locked_folder
 from mjcartpole.learning.session import CHECKPOINT_EVERY, Session, check_interval
 from mjcartpole.learning.training import Training, TrainResult
-from mjcartpole.physics.model import CartPole, load_model
+from mjcartpole.physics.model import CartPole
 from mjcartpole.physics.simulation import silence_mujoco
 from mjcartpole.render_command import film
 from mjcartpole.signals import Interrupted, StopSignals
@@ -163,7 +163,8 @@ def _prepare(config: TrainConfig, how: How) -> CartPole:
     """Check all that can be checked before a folder is touched; returns the model."""
     silence_mujoco()
     _check(how)
-    cartpole = load_model(config.model, config.set)
+    cartpole = config.load_model()
+    config.discretizer(cartpole.poles)
     runs.check_storable(cartpole)
     return cartpole
 

@@ -37,6 +37,7 @@ def run_transfer(
     edits: Edits = None,
     swept: str | None = None,
     integrator: Integrator = "gym",
+    own_timestep: bool = False,
     episodes: int = EPISODES,
     seed: int = SEED,
     workers: int | None = None,
@@ -46,11 +47,13 @@ def run_transfer(
 
     Args:
         sources: Run folders or policy files.
-        models: Names or paths, and "gym"; all that come with the package, and gym, if left out.
+        models: Names or paths, and "gym"; all that come with the package and have as many poles,
+            and gym, if left out.
             A sweep takes one: the first run's own if left out.
         edits: Changes in every model; see `load_model`.
         swept: A sweep, such as "pole.length=0.5:3:0.25", instead of the matrix.
         integrator: See `Simulation`.
+        own_timestep: See `load_model`.
         episodes: Greedy episodes of each policy on each model.
         seed: Seeds the starting states.
         workers: How many evaluations at once; as many as there are cores if left out.
@@ -61,10 +64,11 @@ def run_transfer(
     """
     silence_mujoco()
     policies = _find_policies(sources)
+    physics: dict[str, Any] = {"integrator": integrator, "own_timestep": own_timestep}
     settings: dict[str, Any] = {"episodes": episodes, "seed": seed, "workers": workers}
     if swept is None:
-        chosen = models or (GYM, *model_names())
-        places = [find_place(model, edits, integrator) for model in dict.fromkeys(chosen)]
+        chosen = dict.fromkeys(models or _fitting(policies))
+        places = [find_place(model, edits, **physics) for model in chosen]
         check_writable(make_folder(output))
         matrix = transfer(policies, places, **settings)
         _print_matrix(matrix)
@@ -76,12 +80,18 @@ def run_transfer(
         raise ConfigError(f"a sweep edits one model, not {len(models)}; give one, or no --sweep")
     model = models[0] if models else set_stage(sources[0], Choice()).model
     check_writable(make_folder(output))
-    curve = sweep(policies, model, key, values, edits=edits, integrator=integrator, **settings)
+    curve = sweep(policies, model, key, values, edits=edits, **physics, **settings)
     _print_sweep(curve)
     summary = curve.summary()
     name = "sweep-" + re.sub(r"[^\w.-]+", "-", key)
     _write(output, name, summary["points"], summary, curves(curve))
     return _tell_failed(curve.played)
+
+
+def _fitting(policies: Mapping[str, Policy]) -> list[str]:
+    """All models that there are, and gym, but for those that no policy is for."""
+    poles = {policy.poles for policy in policies.values()}
+    return [name for name in (GYM, *model_names()) if find_place(name).poles in poles]
 
 
 def _find_policies(sources: Sequence[Path]) -> dict[str, Policy]:

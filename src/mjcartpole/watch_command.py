@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from PIL import Image
 
@@ -18,9 +18,8 @@ from mjcartpole.integrator import Integrator, check_integrator
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.training import Training, TrainResult
 from mjcartpole.media.renderer import open_renderer
-from mjcartpole.media.scene import DEFAULT_CAMERA
 from mjcartpole.media.video import write_video
-from mjcartpole.physics.model import CartPole, find_model, load_model, self_contained
+from mjcartpole.physics.model import CartPole, find_model, self_contained
 from mjcartpole.physics.simulation import silence_mujoco
 from mjcartpole.signals import Interrupted, StopSignals
 from mjcartpole.studies.evaluation import Evaluation, evaluate
@@ -128,6 +127,7 @@ def run_watch(
     preset: str = "tuned",
     episodes: int | None = None,
     integrator: Integrator = "gym",
+    own_timestep: bool = False,
     seed: int = 0,
     video: bool = True,
     once: int | None = None,
@@ -140,6 +140,7 @@ def run_watch(
         preset: How to train; see `TrainConfig.preset`.
         episodes: Episodes to train; the preset's if left out.
         integrator: See `Simulation`.
+        own_timestep: See `load_model`.
         seed: Seeds the training.
         video: Film the result.
         once: End after so many saves, the first look included; None: go on until Ctrl-C.
@@ -154,10 +155,15 @@ def run_watch(
     check_integrator(integrator)
     if once is not None and once < 1:
         raise ConfigError(f"once must be a whole number from 1 up, not {once}")
-    changes = {} if episodes is None else {"episodes": episodes}
+    changes: dict[str, Any] = {} if episodes is None else {"episodes": episodes}
     file = find_model(path)
     config = TrainConfig.preset(
-        preset, model=str(file), integrator=integrator, seed=seed, **changes
+        preset,
+        model=str(file),
+        integrator=integrator,
+        own_timestep=own_timestep,
+        seed=seed,
+        **changes,
     )
     check_writable(make_folder(videos))
     signals = StopSignals()
@@ -200,9 +206,8 @@ def _follow(watched: Watched, recipe: Recipe) -> None:
     """
     started = time.perf_counter()
     print(f"\n{time.strftime('%H:%M:%S')}  {watched.path}", flush=True)
-    cartpole = load_model(watched.path)
-    camera, name = _camera(cartpole), watched.path.stem
-    _sketch(cartpole, camera, recipe.videos / f"{name}-sketch.png", started)
+    cartpole, name = recipe.config.load_model(), watched.path.stem
+    _sketch(cartpole, recipe.videos / f"{name}-sketch.png", started)
     watched.check()
     _hold_against_itself(cartpole, watched.check)
     result = _train(recipe.config, cartpole, watched.check)
@@ -214,14 +219,14 @@ def _follow(watched: Watched, recipe: Recipe) -> None:
     if recipe.video:
         stage = Stage(name, result.policy, "mujoco", cartpole, result.config.integrator)
         path = recipe.videos / f"{name}.mp4"
-        _film(stage, camera, path, watched.check, recipe.signals)
+        _film(stage, path, watched.check, recipe.signals)
     _say("done", f"in {time.perf_counter() - started:.1f} s")
 
 
-def _sketch(cartpole: CartPole, camera: str, path: Path, started: float) -> None:
+def _sketch(cartpole: CartPole, path: Path, started: float) -> None:
     """A picture that needs no OpenGL, and no waiting."""
-    with open_renderer(cartpole, camera=camera, kind="sketch") as renderer:
-        picture = Image.fromarray(renderer.render((0.0, 0.0, LEAN, 0.0)))
+    with open_renderer(cartpole, kind="sketch") as renderer:
+        picture = Image.fromarray(renderer.render((0.0, 0.0, *(LEAN, 0.0) * cartpole.poles)))
     with replacing(path) as temporary:
         picture.save(temporary)
     _say("sketch", f"{path}, {time.perf_counter() - started:.1f} s")
@@ -306,13 +311,11 @@ def _greedy(evaluation: Evaluation) -> str:
     return f"mean return {returns.mean():.1f}, minimum {returns.min():.0f} ({endings})"
 
 
-def _film(
-    stage: Stage, camera: str, path: Path, check: Callable[[], None], signals: StopSignals
-) -> None:
+def _film(stage: Stage, path: Path, check: Callable[[], None], signals: StopSignals) -> None:
     take = play(stage)[0]
     check()
     # Shadows and smooth edges would cost more time than all the rest, a sky nearly as much.
-    look = Look(camera=camera, quality="draft", fps=FPS)
+    look = Look(quality="draft", fps=FPS)
     # A signal raised in the midst of OpenGL would be lost: it is looked at between frames.
     with signals.deferred(), Film([[take]], look) as film:
         with contextlib.closing(_checked(film, check, signals)) as frames:
@@ -330,13 +333,6 @@ def _checked(film: Film, check: Callable[[], None], signals: StopSignals) -> Gen
         yield frame
     if signals.stop():
         raise Interrupted(number=signals.number)
-
-
-def _camera(cartpole: CartPole) -> str:
-    """The camera that our models have, or the first one of a model from elsewhere."""
-    model = cartpole.model
-    names = [model.camera(index).name for index in range(model.ncam)]
-    return DEFAULT_CAMERA if DEFAULT_CAMERA in names or not names else str(names[0])
 
 
 def _say(what: str, text: str) -> None:

@@ -26,8 +26,8 @@ def test_the_integrator_reaches_the_simulation():
     [
         (("bullet", "cartpole", "gym"), "backend 'bullet' is unknown; available: mujoco, gym"),
         (("mujoco", "cartpole", "euler"), "integrator 'euler' is unknown; available: gym, mujoco"),
-        (("gym", "long", "gym"), "takes no model, integrator or edits"),
-        (("gym", "cartpole", "mujoco"), "takes no model, integrator or edits"),
+        (("gym", "long", "gym"), "takes no model, integrator, timestep or edits"),
+        (("gym", "cartpole", "mujoco"), "takes no model, integrator, timestep or edits"),
     ],
 )
 def test_nothing_is_silently_ignored(arguments, message):

@@ -21,6 +21,7 @@ from mjcartpole.errors import (
     SimulationError,
 )
 from mjcartpole.physics.model import load_model
+from mjcartpole.physics.simulation import Simulation
 
 ENV_ID = "mjcartpole/CartPole-v1"
 REFERENCE = load_model("cartpole").xml
@@ -191,7 +192,15 @@ def test_a_diverging_model_is_an_error_and_not_an_observation():
 @pytest.mark.parametrize("which", [{1}, {3}, {1, 3}])
 def test_a_velocity_that_is_no_number_is_an_error_at_once(bad, which, env):
     """The positions are still good ones: explicit Euler moved them by the old velocities."""
-    env.simulation.step = lambda control: tuple(bad if i in which else 0.0 for i in range(4))
+    simulation = Simulation(load_model())
+    step = simulation.step
+
+    def broken(control):
+        step(control)
+        simulation.data.qvel[:] = [bad if place in which else 0.0 for place in (1, 3)]
+        return tuple(simulation.state.tolist())
+
+    env.simulation, env._move = simulation, broken
     env.state = np.zeros(4)
     with pytest.raises(SimulationError, match="diverged"):
         env.step(1)

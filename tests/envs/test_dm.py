@@ -99,7 +99,7 @@ def test_a_fallen_pole_ends_the_episode_with_discount_0():
     while not step.last():
         step = env.step([-1.0])
     assert (step.reward, step.discount) == (1.0, 0.0)
-    assert abs(env.physics.pole_angle()) > 0.2094
+    assert np.abs(env.physics.pole_angles()) > 0.2094
 
 
 def test_falling_on_the_last_step_counts_as_falling():

@@ -11,7 +11,7 @@ from mjcartpole.errors import ConfigError
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.discretizer import Discretizer, Grid, row_of
 
-TUNED = TrainConfig().discretizer
+TUNED = TrainConfig().discretizer()
 anything = st.floats(allow_nan=False)
 
 
@@ -80,14 +80,14 @@ def test_rounding_lifts_nothing_into_a_bin_that_is_not_there():
 
 
 def test_the_same_grid_is_an_equal_discretizer():
-    assert TrainConfig().discretizer == TUNED
-    assert hash(TrainConfig().discretizer) == hash(TUNED)
+    assert TrainConfig().discretizer() == TUNED
+    assert hash(TrainConfig().discretizer()) == hash(TUNED)
     assert "grid" not in repr(TUNED)
 
 
 def test_the_articles_grid():
     """`((state + range) / width).astype(int)`, as its code has it, inside the ranges."""
-    discretizer = TrainConfig.preset("article").discretizer
+    discretizer = TrainConfig.preset("article").discretizer()
     ranges = np.array([float(np.float32(math.radians(24))), 3.5])
     width = ranges * 2 / [25, 25]
     rng = np.random.default_rng(0)

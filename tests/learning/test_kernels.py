@@ -8,11 +8,9 @@ import shutil
 import struct
 import subprocess
 import sys
-import sysconfig
 import textwrap
 from pathlib import Path
 
-import mujoco
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -20,107 +18,17 @@ from hypothesis import strategies as st
 from numba.core.registry import cpu_target
 
 from mjcartpole import task
-from mjcartpole.errors import SimulationError
-from mjcartpole.learning import discretizer, episodes, kernels, qlearning, schedules
+from mjcartpole.learning import discretizer, episodes, kernels, qlearning, schedules, stepping
 from mjcartpole.learning.compiled import _arrays
 from mjcartpole.learning.discretizer import Discretizer
 from mjcartpole.physics import cartpole_v1
-from mjcartpole.physics.library import libmujoco
-from mjcartpole.physics.simulation import LARGEST_SANE, check_sane
+from mjcartpole.physics.simulation import LARGEST_SANE
 
 quick = settings(deadline=None, max_examples=200)
-state_values = st.floats() | st.sampled_from(
-    [
-        *(sign * limit for sign in (1, -1) for limit in (task.X_LIMIT, task.THETA_LIMIT)),
-        *(math.nextafter(limit, 9) for limit in (task.X_LIMIT, task.THETA_LIMIT)),
-        *(LARGEST_SANE, -LARGEST_SANE, math.nextafter(LARGEST_SANE, 0), 1e308, -1e308, 0.0, -0.0),
-    ]
-)
-states = st.tuples(*[state_values] * 4)
 
 
 def bits(*values):
     return struct.pack(f"{len(values)}d", *values)
-
-
-def test_libmujoco_is_found_and_linked():
-    library = libmujoco()
-    assert library.is_file()
-    assert library.parent == Path(mujoco.__file__).parent
-    assert kernels.link(library) == ""
-    assert kernels.link(library) == "", "a second time as well"
-
-
-def test_no_library_is_a_reason():
-    assert kernels.link(None) == "libmujoco was not found in the mujoco package"
-
-
-def test_what_is_no_library_is_a_reason(tmp_path):
-    (tmp_path / "libmujoco.so.1").write_text("words")
-    for path in (tmp_path / "libmujoco.so.1", tmp_path / "nothing.so"):
-        assert kernels.link(path).startswith("libmujoco cannot be linked: ")
-        assert path.name in kernels.link(path)
-
-
-def test_a_library_without_mj_step_is_a_reason():
-    """In a process where nothing else has brought mj_step along."""
-    extensions = sysconfig.get_config_var("EXT_SUFFIX")
-    library = next(Path(np.__file__).parent.rglob(f"*{extensions}"))
-    script = "import sys, pathlib; from mjcartpole.learning import kernels; print(kernels.link("
-    done = subprocess.run(
-        [sys.executable, "-c", f"{script}pathlib.Path(sys.argv[1])))", str(library)],
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert done.stdout == f"'{library}' has no mj_step\n"
-
-
-@given(st.integers(0, 2**63))
-@quick
-def test_starting_states_are_those_of_uniform(seed):
-    ours, numpys = np.random.default_rng(seed), np.random.default_rng(seed)
-    for _ in range(3):
-        expected = numpys.uniform(task.RESET_LOW, task.RESET_HIGH, size=(4,))
-        assert bits(*kernels._draw_start(ours)) == expected.tobytes()
-    assert ours.bit_generator.state == numpys.bit_generator.state
-
-
-def test_the_starting_state_of_seed_0_is_gymnasiums():
-    start = kernels._draw_start(np.random.default_rng(0))
-    known = [0.01369617, -0.02302133, -0.04590265, -0.04834723]
-    assert start == pytest.approx(known, abs=1e-8)
-
-
-@given(states)
-@quick
-def test_observations_are_rounded_to_float32(state):
-    with np.errstate(over="ignore"):
-        expected = np.array(state).astype(np.float32).astype(np.float64)
-    np.testing.assert_array_equal(kernels._observe(state), expected)
-
-
-@given(states)
-@quick
-def test_an_episode_is_over_where_the_environment_ends_it(state):
-    x, x_dot, theta, theta_dot = state
-    inside = abs(x) <= task.X_LIMIT and abs(theta) <= task.THETA_LIMIT
-    finite = math.isfinite(x_dot) and math.isfinite(theta_dot)
-    over = kernels._is_over(state)
-    # Two finite velocities of 1e308 may have no finite difference: diverged all the same.
-    assert over is not (inside and finite) or (over and kernels._has_diverged(state))
-    assert kernels._has_terminated(x, theta) is task.has_terminated(x, theta)
-
-
-@given(states)
-@quick
-def test_a_state_has_diverged_where_check_sane_says_so(state):
-    try:
-        check_sane(state, "it")
-    except SimulationError:
-        assert kernels._has_diverged(state)
-    else:
-        assert not kernels._has_diverged(state)
 
 
 @pytest.mark.parametrize("terminated", [True, False])
@@ -215,7 +123,9 @@ def test_the_checksum_covers_all_that_is_compiled_from_elsewhere():
         assert [cell.cell_contents for cell in entry.py_func.__closure__] == [kernels._sources()]
     functions = [value.py_func for value in vars(kernels).values() if hasattr(value, "py_func")]
     elsewhere = {function.__module__ for function in functions} - {kernels.__name__}
-    covered = (cartpole_v1, discretizer, episodes, qlearning, schedules, task)
+    functions = [value.py_func for value in vars(stepping).values() if hasattr(value, "py_func")]
+    elsewhere |= {function.__module__ for function in functions}
+    covered = (cartpole_v1, discretizer, episodes, qlearning, schedules, stepping, task)
     assert elsewhere == {module.__name__ for module in covered}
     texts = "".join(inspect.getsource(module) for module in covered) + repr(LARGEST_SANE)
     assert hashlib.sha256(texts.encode()).hexdigest() == kernels._sources()

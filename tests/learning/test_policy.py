@@ -14,7 +14,7 @@ from mjcartpole.learning.policy import Policy
 
 
 def some_policy(seed=0):
-    grid = TrainConfig().discretizer
+    grid = TrainConfig().discretizer()
     return Policy(grid, np.random.default_rng(seed).normal(size=(*grid.bins, 2)))
 
 

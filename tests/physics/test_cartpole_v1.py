@@ -7,7 +7,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from mjcartpole.learning import kernels
+from mjcartpole.learning import stepping
 from mjcartpole.physics.cartpole_v1 import FORCE, cartpole_v1_step
 
 GYM = gymnasium.make("CartPole-v1", disable_env_checker=True).unwrapped
@@ -42,7 +42,7 @@ anything = st.floats(-1e100, 1e100)
 def test_any_state_moves_as_in_gymnasium(state, action):
     expected = gyms_step(state, action)
     assert our_step(cartpole_v1_step, state, action) == expected
-    assert our_step(kernels._cartpole_v1_step, state, action) == expected
+    assert our_step(stepping._cartpole_v1_step, state, action) == expected
 
 
 @pytest.mark.parametrize("scale", [1e-8, 0.01, 1.0, 100.0])
@@ -52,7 +52,7 @@ def test_thousands_of_states_move_as_in_gymnasium(scale):
     for state, action in zip(states.tolist(), rng.integers(2, size=2_000).tolist(), strict=True):
         expected = gyms_step(state, action)
         assert our_step(cartpole_v1_step, state, action) == expected
-        assert our_step(kernels._cartpole_v1_step, state, action) == expected
+        assert our_step(stepping._cartpole_v1_step, state, action) == expected
 
 
 def test_whole_episodes_are_gymnasiums():
@@ -66,7 +66,7 @@ def test_whole_episodes_are_gymnasiums():
             force = FORCE if action == 1 else -FORCE
             plain, compiled = (
                 cartpole_v1_step(*plain, force),
-                kernels._cartpole_v1_step(*compiled, force),
+                stepping._cartpole_v1_step(*compiled, force),
             )
             expected = env.unwrapped.state.tobytes()
             assert np.array(plain).tobytes() == np.array(compiled).tobytes() == expected

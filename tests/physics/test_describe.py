@@ -34,30 +34,31 @@ def test_the_reference():
 
 def test_a_rail_along_y_a_hinge_and_a_gear_that_turn_backwards():
     found = described("lying_rail")
-    assert (found.rail, found.up, found.leans) == ("+y", "+z", -1)
+    (pole,) = found.poles
+    assert (found.rail, found.up, pole.leans) == ("+y", "+z", -1)
     assert (found.forces, found.controls) == ((-8.0, 8.0), (1.0, -1.0))
     assert (found.substeps, found.timestep, found.integrator) == (5, 0.004, "implicitfast")
     assert found.control_step == pytest.approx(0.02)
-    assert (found.cart_mass, found.pole_mass) == pytest.approx((0.8, 0.15))
-    assert found.com_distance == pytest.approx((0.05 * 0.3 + 0.1 * 0.6) / 0.15 - 0.01)
+    assert (found.cart_mass, pole.mass) == pytest.approx((0.8, 0.15))
+    assert pole.com_distance == pytest.approx((0.05 * 0.3 + 0.1 * 0.6) / 0.15 - 0.01)
     assert found.rail_limits == (-2.0, 2.0)
 
 
 def test_a_pole_that_hangs_at_angle_0():
     found = described("hanging")
-    assert found.upright == pytest.approx(math.pi)
-    assert found.balance == pytest.approx(0.0, abs=1e-12)
+    assert found.poles[0].upright == pytest.approx(math.pi)
+    assert found.poles[0].balance == pytest.approx(0.0, abs=1e-12)
     angle = next(line for line in found.text() if line.startswith("angle"))
     assert "the file has upright at 180 degrees, angles are counted from there" in angle
 
 
 def test_y_up_and_no_names():
     found = described("y_up")
-    assert (found.cart, found.pole) == (
+    assert (found.cart, found.poles[0].joint) == (
         "joint 'a' of body 1 (unnamed)",
         "joint 1 (unnamed) of body 2 (unnamed)",
     )
-    assert (found.up, found.leans, found.forces) == ("+y", -1, (-10.0, 10.0))
+    assert (found.up, found.poles[0].leans, found.forces) == ("+y", -1, (-10.0, 10.0))
     assert not found.equations_apply
 
 
@@ -93,17 +94,18 @@ def test_the_simulation_does_what_the_description_says(path):
     """
     cartpole = load_model(path)
     found, simulation = describe(cartpole), Simulation(cartpole, "gym")
-    states = np.array([[0, 0, 0.1, 0], [0, 0, -0.1, 0], [0, 0, found.balance, 0]])
+    (pole,) = found.poles
+    states = np.array([[0, 0, 0.1, 0], [0, 0, -0.1, 0], [0, 0, pole.balance, 0]])
     middle = sum(found.controls) / 2
     accelerations = simulation.accelerations(states, np.full(3, middle))
     assert accelerations[0, 1] > 0 > accelerations[1, 1]
     assert accelerations[2, 1] == pytest.approx(0.0, abs=1e-9)
     pushed = simulation.accelerations(np.zeros((2, 4)), np.array(found.controls))
     assert pushed[0, 0] < 0 < pushed[1, 0]
-    assert np.sign(pushed[:, 1]).tolist() == [found.leans, -found.leans]
-    # At rest: force = (all mass) * x_acc + pole_mass * com_distance * theta_acc, signed.
-    mass = found.cart_mass + found.pole_mass
-    lever = found.leans * found.pole_mass * found.com_distance * math.cos(found.balance)
+    assert np.sign(pushed[:, 1]).tolist() == [pole.leans, -pole.leans]
+    # At rest: force = (all mass) * x_acc + pole's mass * com_distance * theta_acc, signed.
+    mass = found.cart_mass + pole.mass
+    lever = pole.leans * pole.mass * pole.com_distance * math.cos(pole.balance)
     force = mass * pushed[:, 0] + lever * pushed[:, 1]
     assert force == pytest.approx(found.forces)
 

@@ -104,13 +104,14 @@ def test_the_tuned_preset_balances_it(path):
 def test_dm_controls_cart_pole_is_understood():
     needs(DM_CONTROL)
     found = describe(load_model(DM_CONTROL))
-    assert (found.cart, found.pole) == (
+    (pole,) = found.poles
+    assert (found.cart, pole.joint) == (
         "joint 'slider' of body 'cart'",
         "joint 'hinge_1' of body 'pole_1'",
     )
     assert (found.forces, found.timestep, found.substeps) == ((-10.0, 10.0), 0.01, 2)
-    assert (found.rail, found.up, found.leans, found.integrator) == ("+x", "+z", 1, "RK4")
-    assert (found.cart_mass, found.pole_mass, found.com_distance) == pytest.approx((1, 0.1, 0.5))
+    assert (found.rail, found.up, pole.leans, found.integrator) == ("+x", "+z", 1, "RK4")
+    assert (found.cart_mass, pole.mass, pole.com_distance) == pytest.approx((1, 0.1, 0.5))
     assert found.rail_limits == (-1.8, 1.8)
     assert found.beyond == ("limit of joint 'slider' at -1.8 and 1.8",)
 
@@ -120,13 +121,16 @@ def test_gymnasiums_inverted_pendulum_is_understood():
     found = describe(load_model(GYMNASIUM))
     assert (found.forces, found.substeps, found.integrator) == ((-300.0, 300.0), 1, "RK4")
     assert (found.gear, found.controls) == (100.0, (-3.0, 3.0))
-    assert found.balance == pytest.approx(-0.001 / 0.6, rel=1e-3)
+    assert found.poles[0].balance == pytest.approx(-0.001 / 0.6, rel=1e-3)
     assert found.rail_limits == (-1.0, 1.0)
 
 
 REFERENCE = (models_folder() / "cartpole.xml").read_text(encoding="utf-8")
 CART = '<body><joint name="s" type="slide" axis="1 0 0"/><geom size="0.1"/>{}</body>'
 POLE = '<body><joint name="h" axis="0 1 0"/><geom pos="0 0 1" size="0.1"/>{}</body>'
+WHEEL = '<body><joint name="w" axis="0 1 0"/><geom size="0.1"/></body>'
+TWIN = '<joint name="h2" axis="0 1 0"/>'
+ACROSS = '<body><joint name="a" axis="1 0 0"/><geom pos="0 0 1" size="0.1"/></body>'
 MOTOR = '<motor name="m" joint="s"/>'
 
 
@@ -152,13 +156,21 @@ NO_CART_POLES = {
         document(CART.format(CART.format(POLE.format("")).replace('"s"', '"s2"'))),
         "2 slide joints where one .the cart's. is needed",
     ),
-    "two poles": (
-        document(with_pole(POLE.format("") + POLE.format("").replace('"h"', '"h2"'))),
-        "2 hinge joints .* several poles are not supported yet",
+    "a wheel": (
+        document(with_pole(POLE.format("") + WHEEL)),
+        "a hinge .'w'. that turns about its own centre of mass, as a wheel and no pole",
     ),
-    "double pole": (
-        document(with_pole(POLE.format(POLE.format("").replace('"h"', '"h2"')))),
-        "2 hinge joints .* several poles are not supported yet",
+    "two hinges that turn alike": (
+        document(with_pole(POLE.format("").replace("<geom", TWIN + "<geom", 1))),
+        "hinges that turn alike",
+    ),
+    "a second pole that a push does not tilt": (
+        document(with_pole(POLE.format("") + ACROSS)),
+        "a hinge .'a'. whose axis is along the rail",
+    ),
+    "a second pole beside": (
+        document(with_pole(POLE.format("")) + POLE.format("").replace('"h"', '"h2"')),
+        "a hinge .'h2'. whose body is not inside the cart's body",
     ),
     "pole beside": (document(with_pole("") + POLE.format("")), "not inside the cart's body"),
     "cart on pole": (

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mjcartpole.errors import ConfigError
+from mjcartpole.errors import ConfigError, ModelSyntaxError
 from mjcartpole.physics.beyond import beyond_equations
 from mjcartpole.physics.edit import (
     edit_document,
@@ -246,6 +246,12 @@ def test_what_is_fixed_to_the_pole_moves_along():
     inertia = 0.2 * 4 / 12 + 0.2 * 0.5**2 + 0.2 * 0.5**2 + 2 * 0.000144
     assert found.com_distance == pytest.approx(1.5, rel=1e-12)
     assert found.inertia == pytest.approx(inertia, rel=1e-12)
+
+
+def test_a_number_that_mujoco_does_not_read_is_one_line():
+    """It calls a number too large that is too small for a double of full precision."""
+    with pytest.raises(ModelSyntaxError, match="number is too large in attribute 'damping'"):
+        load_model("cartpole", {"hinge.damping": 1e-310, "pole.length": 2})
 
 
 def test_horizontal_gravity_stays():

@@ -78,7 +78,7 @@ def test_plain_floats_put_a_state_as_the_setter_does():
     state = (0.1, -0.2, 0.05, 0.3)
     set_, put = Simulation(CARTPOLE), Simulation(CARTPOLE)
     set_.state = state
-    put.put(*state)
+    put.put(state)
     np.testing.assert_array_equal(put.state, state)
     assert put.step(1.0) == set_.step(1.0)
 

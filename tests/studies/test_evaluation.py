@@ -79,7 +79,7 @@ def test_settings_that_make_no_sense_are_refused_whoever_plays(engine):
     policy = train(TrainConfig(episodes=2)).policy
     with pytest.raises(ConfigError, match="backend 'bullet' is unknown"):
         evaluate(policy, backend="bullet", engine=engine)
-    with pytest.raises(ConfigError, match="takes no model, integrator or edits"):
+    with pytest.raises(ConfigError, match="takes no model, integrator, timestep or edits"):
         evaluate(policy, backend="gym", integrator="mujoco", engine=engine)
     with pytest.raises(ConfigError, match="whole number from 1 up, not 0"):
         evaluate(policy, episodes=0, engine=engine)

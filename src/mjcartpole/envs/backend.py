@@ -33,8 +33,8 @@ def check_backend(
     if backend == "gym" and ((model, integrator) != ("cartpole", "gym") or edits):
         asked = ", ".join(f"'{word}'" for word in (model, integrator, *edits))
         raise ConfigError(
-            f"backend 'gym' is gymnasium's {GYM_ID} as it is: it takes no model, integrator or "
-            f"edits (asked for {asked}); use backend 'mujoco' for these"
+            f"backend 'gym' is gymnasium's {GYM_ID} as it is: it takes no model, integrator, "
+            f"timestep or edits (asked for {asked}); use backend 'mujoco' for these"
         )
 
 

@@ -87,6 +87,10 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int]):
     >>> env.observation_space == reference.observation_space
     True
 
+    A model with several poles has two more values for each, in the order of the document; all rules
+    for the pole hold for each of them. The angle of a pole that stands on another is counted from
+    that one's direction.
+
     ## Rewards
 
     1 for every step, the terminating one included. With `sutton_barto_reward=True`: 0 for every
@@ -94,7 +98,7 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int]):
 
     ## Starting State
 
-    Each of the four values is drawn uniformly from (-0.05, 0.05) in the order x, x_dot, theta,
+    Each of the values is drawn uniformly from (-0.05, 0.05) in the order x, x_dot, theta,
     theta_dot; `reset(options={"low": ..., "high": ...})` draws from other bounds.
 
     ## Episode End
@@ -112,6 +116,7 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int]):
     |-----------------------|------------------------|-------------|-------------------------------|
     | `model`               | str, path, MjSpec      | "cartpole"  | A shipped model's name, an MJCF file, an XML document, or an MjSpec |
     | `edits`               | dict                   | None        | Edits of the model, such as `{"pole.length": 1.5}` |
+    | `own_timestep`        | bool                   | False       | One physics step of the file per action, instead of 0.02 s |
     | `integrator`          | "gym" or "mujoco"      | "gym"       | Explicit Euler as CartPole-v1, or the integrator that the file names |
     | `sutton_barto_reward` | bool                   | False       | See Rewards                   |
     | `render_mode`         | None, "rgb_array", "human" | None    | Nothing, arrays, or a window (where there is a screen) |
@@ -140,6 +145,7 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int]):
         *,
         model: ModelLike = "cartpole",
         edits: Edits = None,
+        own_timestep: bool = False,
         integrator: Integrator = "gym",
         sutton_barto_reward: bool = False,
         render_mode: RenderMode | None = None,
@@ -156,11 +162,15 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int]):
             RenderError: The size of a picture makes no sense, or the model has no such camera.
         """
         _check_render_mode(render_mode, width, height)
-        bound = task.observation_bound()
+        cartpole = load_model(model, edits, own_timestep=own_timestep)
+        self.simulation, poles = Simulation(cartpole, integrator), cartpole.poles
+        self.metadata = {**self.metadata, "render_fps": max(1, round(1 / cartpole.control_step))}
+        bound = task.observation_bound(poles)
         self.observation_space = spaces.Box(-bound, bound, dtype=np.float32)
         self.action_space = spaces.Discrete(task.N_ACTIONS)
         self.render_mode = render_mode
-        self.simulation = Simulation(load_model(model, edits), integrator)
+        step = self.simulation.step
+        self._move: Callable[[float], State] = step if poles == 1 else _as_one_pole(step)
         self._advance: Callable[[float], State] = _needs_reset
         self._left, self._right = self.simulation.cartpole.controls
         self._step_reward, self._end_reward, self._late_reward = (
@@ -171,7 +181,7 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int]):
         observation = np.zeros(4, dtype=np.float32)
         # A view that takes single floats several times faster than the array does.
         self._cells: memoryview[float] = observation.data.cast("B").cast("f")
-        self._new_observation = observation.copy
+        self._new_observation = observation.copy if poles == 1 else self._observe_poles
         picture = {"width": width, "height": height, "camera": camera}
         if render_mode == "rgb_array" or picture != _DEFAULT_PICTURE:
             check_picture(self.simulation.cartpole, width, height, camera)
@@ -184,18 +194,21 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int]):
 
     @property
     def state(self) -> npt.NDArray[np.float64] | None:
-        """The float64 state `(x, x_dot, theta, theta_dot)`, shape (4,); None before a reset."""
+        """The float64 state, two values for the cart and for each pole; None before a reset.
+
+        It is `(x, x_dot, theta, theta_dot)`: m, m/s, rad, rad/s; shape (4,) with one pole.
+        """
         return None if self._advance is _needs_reset else self.simulation.state
 
     @state.setter
     def state(self, state: npt.ArrayLike) -> None:
         self.simulation.state = state
-        self._advance = self.simulation.step
+        self._advance = self._move
 
     def step(
         self, action: np.int64 | int
     ) -> tuple[npt.NDArray[np.float32], float, bool, bool, dict[str, Any]]:
-        """Advance 0.02 s.
+        """Advance one control step: 0.02 s, unless the file's own timestep was asked for.
 
         Raises:
             InvalidActionError: The action is not in the action space.
@@ -224,7 +237,7 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int]):
         ):
             terminated, reward = False, self._step_reward
         else:
-            terminated, reward = True, self._end((x, x_dot, theta, theta_dot))
+            terminated, reward = True, self._end()
         # None is told apart sooner than a word is.
         if self.render_mode is not None and self.render_mode == "human":
             self.render()
@@ -235,9 +248,13 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int]):
         cells[3] = theta_dot
         return new_observation(), reward, terminated, False, {}
 
-    def _end(self, state: State) -> float:
+    def _observe_poles(self) -> npt.NDArray[np.float32]:
+        """The observation of several poles, read from the simulation."""
+        return self.simulation.state.astype(np.float32)
+
+    def _end(self) -> float:
         """Reward of a step that ends the episode, or comes after its end."""
-        check_sane(state, self.simulation.cartpole.name)
+        check_sane(tuple(self.simulation.state.tolist()), self.simulation.cartpole.name)
         if self._steps_after_end is None:
             self._steps_after_end = 0
             return self._end_reward
@@ -260,9 +277,9 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int]):
         """
         super().reset(seed=seed)
         low, high = maybe_parse_reset_bounds(options, task.RESET_LOW, task.RESET_HIGH)
-        state = self.np_random.uniform(low=low, high=high, size=(4,))
-        self.simulation.put(*state.tolist())
-        self._advance = self.simulation.step
+        state = self.np_random.uniform(low=low, high=high, size=self.simulation.size)
+        self.simulation.put(state.tolist())
+        self._advance = self._move
         self._steps_after_end = None
         if self.render_mode == "human":
             self.render()
@@ -315,6 +332,20 @@ def _check_render_mode(render_mode: str | None, width: int, height: int) -> None
             f"a window has the size that the screen gives it, not {width}x{height}; "
             'width and height are for render_mode="rgb_array"'
         )
+
+
+def _as_one_pole(step: Callable[[float], State]) -> Callable[[float], State]:
+    """Steps of several poles that return what the rules look at: the worst of all poles.
+
+    That is `(x, x_dot, theta, theta_dot)` with the largest angle and the largest angular velocity,
+    without signs.
+    """
+
+    def advance(control: float) -> State:
+        state = step(control)
+        return state[0], state[1], task.farthest(state[2::2]), task.farthest(state[3::2])
+
+    return advance
 
 
 def _needs_reset(control: float) -> State:

@@ -57,24 +57,23 @@ class Physics(mujoco.Physics):  # type: ignore[misc]
 
     @property
     def state(self) -> npt.NDArray[np.float64]:
-        """The state `(x, x_dot, theta, theta_dot)`, shape (4,), a copy; m, m/s, rad, rad/s."""
-        slider, hinge = self.cartpole.slider, self.cartpole.hinge
-        qpos, qvel = self.data.qpos, self.data.qvel
-        return np.array([qpos[slider], qvel[slider], qpos[hinge], qvel[hinge]])
+        """The state `(x, x_dot, theta, theta_dot, …)`, a copy; m, m/s, rad, rad/s."""
+        joints = list(self.cartpole.joints)
+        return np.column_stack([self.data.qpos[joints], self.data.qvel[joints]]).ravel()
 
     def put(self, state: npt.NDArray[np.float64]) -> None:
-        """Put the cart-pole into a state, shape (4,); inside `reset_context`."""
-        slider, hinge = self.cartpole.slider, self.cartpole.hinge
-        self.data.qpos[[slider, hinge]] = state[[0, 2]]
-        self.data.qvel[[slider, hinge]] = state[[1, 3]]
+        """Put the cart-pole into a state; inside `reset_context`."""
+        joints = list(self.cartpole.joints)
+        self.data.qpos[joints], self.data.qvel[joints] = state[0::2], state[1::2]
 
     def cart_position(self) -> float:
         """Where the cart is, m."""
         return float(self.data.qpos[self.cartpole.slider])
 
-    def pole_angle(self) -> float:
-        """How far the pole leans to +x, rad."""
-        return float(self.data.qpos[self.cartpole.hinge])
+    def pole_angles(self) -> npt.NDArray[np.float64]:
+        """How far each pole leans, rad, shape (poles,)."""
+        angles: npt.NDArray[np.float64] = self.data.qpos[list(self.cartpole.hinges)]
+        return angles
 
 
 class Balance(control.Task):  # type: ignore[misc]
@@ -85,10 +84,10 @@ class Balance(control.Task):  # type: ignore[misc]
       lies outside counts as the nearer end. With `discrete`, it is CartPole-v1's own: 0 pushes to
       the left, 1 to the right.
     - Observation: an OrderedDict of `position`, `(x, theta)`, and `velocity`, `(x_dot, theta_dot)`,
-      each of shape (2,), float64.
-    - Reward 1 for every step, the last one included. Discount 0 where the pole leans more than 12
+      each of shape (2,), float64; one more angle each for each further pole.
+    - Reward 1 for every step, the last one included. Discount 0 where a pole leans more than 12
       degrees or the cart is more than 2.4 m from the middle, 1 elsewhere, the time limit included.
-    - Each of the four state values starts uniformly within ±0.05. A seed gives the starting
+    - Each of the state's values starts uniformly within ±0.05. A seed gives the starting
       states that the gymnasium environment has after `reset(seed=...)` and further resets.
 
     Attributes:
@@ -116,7 +115,8 @@ class Balance(control.Task):  # type: ignore[misc]
     def initialize_episode(self, physics: Physics) -> None:
         """Draw a starting state."""
         low, high = task.RESET_LOW, task.RESET_HIGH
-        physics.put(self.random.uniform(low=low, high=high, size=(4,)))
+        size = 2 * len(physics.cartpole.joints)
+        physics.put(self.random.uniform(low=low, high=high, size=size))
         self.steps = 0
 
     def action_spec(self, physics: Physics) -> specs.BoundedArray:
@@ -143,7 +143,7 @@ class Balance(control.Task):  # type: ignore[misc]
     ) -> "collections.OrderedDict[str, npt.NDArray[np.float64]]":
         """The state, positions and velocities apart."""
         state = physics.state
-        return collections.OrderedDict(position=state[[0, 2]], velocity=state[[1, 3]])
+        return collections.OrderedDict(position=state[0::2], velocity=state[1::2])
 
     def get_reward(self, physics: Physics) -> float:
         """1 for every step."""
@@ -151,7 +151,8 @@ class Balance(control.Task):  # type: ignore[misc]
 
     def get_termination(self, physics: Physics) -> float | None:
         """Discount of the step that ends an episode; None while it goes on."""
-        if task.has_terminated(physics.cart_position(), physics.pole_angle()):
+        farthest = float(np.abs(physics.pole_angles()).max())
+        if task.has_terminated(physics.cart_position(), farthest):
             return 0.0
         return 1.0 if self.steps >= self._limit else None
 
@@ -172,6 +173,7 @@ def load(
     *,
     model: ModelLike = "cartpole",
     edits: Edits = None,
+    own_timestep: bool = False,
     seed: int | None = None,
     discrete: bool = False,
     time_limit: float = TIME_LIMIT,
@@ -192,6 +194,7 @@ def load(
         task_name: `balance`.
         model: See `load_model`.
         edits: Changes of it; see `load_model`.
+        own_timestep: See `load_model`.
         seed: Seeds the starting states; None draws one.
         discrete: Take CartPole-v1's actions 0 and 1 instead of a control between their two.
         time_limit: Seconds until an episode is cut off; `float("inf")` for never.
@@ -207,9 +210,10 @@ def load(
         raise ConfigError(f"time_limit must be more than 0 seconds, not {time_limit}")
     if seed is not None and seed < 0:
         raise ConfigError(f"seed must be a whole number from 0 up, not {seed}")
-    cartpole = load_model(model, edits)
-    step = cartpole.timestep * cartpole.substeps
-    limit = time_limit if math.isinf(time_limit) else max(1, round(time_limit / step))
+    cartpole = load_model(model, edits, own_timestep=own_timestep)
+    limit = time_limit
+    if not math.isinf(time_limit):
+        limit = max(1, round(time_limit / cartpole.control_step))
     random, _ = seeding.np_random(seed)
     balance = Balance(cartpole, random=random, limit=limit, discrete=discrete)
     # Without dm_control's half steps, a step is one call of mj_step, whatever the solver.

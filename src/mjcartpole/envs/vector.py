@@ -83,6 +83,7 @@ class CartPoleVectorEnv(
     | `max_episode_steps`   | int                    | 500         | Steps until truncation        |
     | `model`               | str, path, MjSpec      | "cartpole"  | As in `CartPoleEnv`           |
     | `edits`               | dict                   | None        | Edits of the model, such as `{"pole.length": 1.5}` |
+    | `own_timestep`        | bool                   | False       | One physics step of the file per action, instead of 0.02 s |
     | `integrator`          | "gym" or "mujoco"      | "gym"       | As in `CartPoleEnv`           |
     | `sutton_barto_reward` | bool                   | False       | 0 per step and -1 at termination, instead of 1 per step |
     | `threads`             | int or None            | None        | Threads that step; None: one per core |
@@ -90,7 +91,8 @@ class CartPoleVectorEnv(
     | `width`, `height`     | int                    | 640, 480    | Size of a picture, in pixels  |
     | `camera`              | str                    | "side"      | A camera of the model         |
 
-    `envs.state` reads and sets the float64 states, shape `(num_envs, 4)`.
+    `envs.state` reads and sets the float64 states, shape `(num_envs, 4)` for a model with one pole;
+    each further pole has two more values.
 
     >>> envs.state = [(0.0, 0.0, 0.1, 0.0)] * 3
     >>> [round(float(value), 4) for value in envs.step([1, 0, 1])[0][0]]
@@ -115,6 +117,7 @@ class CartPoleVectorEnv(
         max_episode_steps: int = task.TIME_LIMIT,
         model: ModelLike = "cartpole",
         edits: Edits = None,
+        own_timestep: bool = False,
         integrator: Integrator = "gym",
         sutton_barto_reward: bool = False,
         threads: int | None = None,
@@ -136,10 +139,12 @@ class CartPoleVectorEnv(
         check_integrator(integrator)
         _check_render_mode(render_mode)
         self.render_mode = render_mode
-        self.cartpole = load_model(model, edits)
+        self.cartpole = load_model(model, edits, own_timestep=own_timestep)
         if render_mode is not None or (width, height, camera) != _DEFAULT_PICTURE:
             check_picture(self.cartpole, width, height, camera)
-        bound = task.observation_bound()
+        fps = max(1, round(1 / self.cartpole.control_step))
+        self.metadata = {**self.metadata, "render_fps": fps}
+        bound = task.observation_bound(self.cartpole.poles)
         self.single_observation_space = spaces.Box(-bound, bound, dtype=np.float32)
         self.single_action_space = spaces.Discrete(task.N_ACTIONS)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
@@ -162,21 +167,21 @@ class CartPoleVectorEnv(
         self._fresh = batch.state[0].copy()
         qpos, qvel = batch.bind("qpos"), batch.bind("qvel")
         # The batch keeps one row per environment; these are columns of it, shape (num_envs,).
-        self._x, self._theta = qpos[:, cartpole.slider], qpos[:, cartpole.hinge]
-        self._x_dot, self._theta_dot = qvel[:, cartpole.slider], qvel[:, cartpole.hinge]
+        self._qpos = [qpos[:, joint] for joint in cartpole.joints]
+        self._qvel = [qvel[:, joint] for joint in cartpole.joints]
         self._control = batch.bind("ctrl")[:, 0]
         self._controls = np.array(cartpole.controls)
 
     def _prepare_episodes(self) -> None:
         """Make the arrays that live from step to step."""
-        n = self.num_envs
+        n, joints = self.num_envs, len(self.cartpole.joints)
         self._bounds = task.RESET_LOW, task.RESET_HIGH
         self._has_state = False
         # The same numbers as in the batch, side by side: what numpy is quick with.
-        self._state = np.zeros((n, 4))
+        self._state = np.zeros((n, 2 * joints))
         self._positions, self._velocities = self._state[:, 0::2], self._state[:, 1::2]
-        self._sizes = np.empty((n, 4))
-        self._moves = np.empty((n, 2))
+        self._sizes = np.empty_like(self._state)
+        self._moves = np.empty((n, joints))
         # Steps since the reset of all, and at which of them each episode is truncated.
         self._clock = 0
         self._deadlines = np.full(n, self.max_episode_steps)
@@ -185,9 +190,9 @@ class CartPoleVectorEnv(
 
     @property
     def state(self) -> npt.NDArray[np.float64] | None:
-        """The float64 states, shape (num_envs, 4), a copy; None before a reset.
+        """The float64 states, shape (num_envs, 4) with one pole, a copy; None before a reset.
 
-        Each is `(x, x_dot, theta, theta_dot)`: m, m/s, rad, rad/s. Setting it leaves nothing of
+        Each is `(x, x_dot, theta, theta_dot, …)`: m, m/s, rad, rad/s. Setting it leaves nothing of
         the motion before; the episodes go on, and those that are over restart with the next step.
         """
         return self._state.copy() if self._has_state else None
@@ -197,8 +202,9 @@ class CartPoleVectorEnv(
         values = np.asarray(states, dtype=np.float64)
         if values.shape != self._state.shape:
             raise ConfigError(
-                f"states have the shape {self._state.shape}: (x, x_dot, theta, theta_dot) of "
-                f"each environment, not the shape {values.shape}"
+                f"states have the shape {self._state.shape}: "
+                f"({', '.join(task.state_names(self.cartpole.poles))}) of each environment, "
+                f"not the shape {values.shape}"
             )
         self._place(_EVERYONE, values)
         self._has_state = True
@@ -214,7 +220,7 @@ class CartPoleVectorEnv(
                 next reset.
 
         Returns:
-            Observations of shape (num_envs, 4), and an empty dict.
+            Observations, shape (num_envs, 4) with one pole, and an empty dict.
 
         Raises:
             ValueError: A bound is no number, or low is above high.
@@ -236,14 +242,14 @@ class CartPoleVectorEnv(
         npt.NDArray[np.bool_],
         dict[str, Any],
     ]:
-        """Advance 0.02 s; restart the environments whose episode ended in the step before.
+        """Advance one control step; restart environments whose episode ended in the step before.
 
         Args:
             actions: Integers of shape (num_envs,).
 
         Returns:
-            Observations of shape (num_envs, 4); rewards, terminations and truncations of shape
-            (num_envs,); and an empty dict.
+            Observations, shape (num_envs, 4) with one pole; rewards, terminations and truncations,
+            shape (num_envs,); and an empty dict.
 
         Raises:
             InvalidActionError: The actions are not in the action space.
@@ -289,22 +295,21 @@ class CartPoleVectorEnv(
 
     def _explicit_euler(self) -> None:
         """Positions move by the old velocities, velocities as MuJoCo says."""
-        state = self._state
         for _ in range(self.cartpole.substeps):
             np.multiply(self._velocities, self._timestep, out=self._moves)
             self._positions += self._moves
             self._batch.step()
-            self._x[...], self._theta[...] = state[:, 0], state[:, 2]
-            state[:, 1], state[:, 3] = self._x_dot, self._theta_dot
+            for joint, (qpos, qvel) in enumerate(zip(self._qpos, self._qvel, strict=True)):
+                qpos[...] = self._positions[:, joint]
+                self._velocities[:, joint] = qvel
 
     def _own_integrator(self) -> None:
-        state = self._state
         self._batch.step(nstep=self.cartpole.substeps)
-        state[:, 0], state[:, 1] = self._x, self._x_dot
-        state[:, 2], state[:, 3] = self._theta, self._theta_dot
+        for joint, (qpos, qvel) in enumerate(zip(self._qpos, self._qvel, strict=True)):
+            self._positions[:, joint], self._velocities[:, joint] = qpos, qvel
 
     def _have_terminated(self) -> npt.NDArray[np.bool_]:
-        """Whose state, shape (num_envs, 4), is beyond a limit; a new array.
+        """Whose state is beyond a limit, shape (num_envs,); a new array.
 
         Raises:
             SimulationError: A state is NaN or beyond all bounds.
@@ -313,16 +318,16 @@ class CartPoleVectorEnv(
         # One look at the largest number finds NaN and infinity too.
         if not sizes.max() < LARGEST_SANE:
             self._refuse_diverged()
-        out_of_track = sizes[:, 0] > task.X_LIMIT
-        fallen = sizes[:, 2] > task.THETA_LIMIT
-        return np.logical_or(out_of_track, fallen)
+        over = sizes[:, 0] > task.X_LIMIT
+        for pole in range(self.cartpole.poles):
+            over |= sizes[:, 2 + 2 * pole] > task.THETA_LIMIT
+        return over
 
     def _refuse_diverged(self) -> None:
         insane = ~(self._sizes < LARGEST_SANE).all(axis=1)
         index = int(np.flatnonzero(insane)[0])
-        x, x_dot, theta, theta_dot = self._state[index].tolist()
         name = f"{self.cartpole.name} (environment {index} of {self.num_envs})"
-        check_sane((x, x_dot, theta, theta_dot), name)
+        check_sane(tuple(self._state[index].tolist()), name)
 
     def _rewards(self, terminations: npt.NDArray[np.bool_]) -> npt.NDArray[np.float32]:
         if self._sutton_barto_reward:
@@ -330,12 +335,12 @@ class CartPoleVectorEnv(
         return np.ones(self.num_envs, dtype=np.float32)
 
     def _draw(self, n: int) -> npt.NDArray[np.float64]:
-        """Starting states, shape (n, 4), drawn in gymnasium's order."""
+        """Starting states of n environments, one row each, drawn in gymnasium's order."""
         low, high = self._bounds
-        return self.np_random.uniform(low=low, high=high, size=(4, n)).T
+        return self.np_random.uniform(low=low, high=high, size=(self._state.shape[1], n)).T
 
     def _place(self, ids: npt.NDArray[np.intp] | slice, states: npt.NDArray[np.float64]) -> None:
-        """Put environments into states, shape (n, 4); nothing of their past remains."""
+        """Put environments into states, one row each; nothing of their past remains."""
         if self._batch.persistent:
             self._batch.reset(
                 np.arange(self.num_envs)[ids], stage=int(mujoco.mjtStage.mjSTAGE_NONE)
@@ -343,8 +348,8 @@ class CartPoleVectorEnv(
         else:
             # The row is all there is, and to copy it is a hundred times quicker than `reset`.
             self._batch.state[ids] = self._fresh
-        self._x[ids], self._x_dot[ids] = states[:, 0], states[:, 1]
-        self._theta[ids], self._theta_dot[ids] = states[:, 2], states[:, 3]
+        for joint, (qpos, qvel) in enumerate(zip(self._qpos, self._qvel, strict=True)):
+            qpos[ids], qvel[ids] = states[:, 2 * joint], states[:, 2 * joint + 1]
         self._state[ids] = states
 
     def render(self) -> tuple[npt.NDArray[np.uint8], ...] | None:

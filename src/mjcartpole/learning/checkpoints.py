@@ -93,13 +93,16 @@ def save_checkpoint(folder: Path, checkpoint: Checkpoint) -> None:
             latest.replace(previous)
 
 
-def load_checkpoint(path: Path, config: TrainConfig, document: str) -> Checkpoint:
+def load_checkpoint(
+    path: Path, config: TrainConfig, document: str, *, poles: int = 1
+) -> Checkpoint:
     """Read a checkpoint of a training.
 
     Args:
         path: The file.
         config: The config that it must be of.
         document: The model that it must be of.
+        poles: How many that has.
 
     Raises:
         CheckpointError: It is not there, damaged, or of another training.
@@ -115,7 +118,7 @@ def load_checkpoint(path: Path, config: TrainConfig, document: str) -> Checkpoin
     if content[:start] != _line(archive):
         raise CheckpointError(f"'{path}' is cut off or was altered: its checksum does not match")
     try:
-        checkpoint = _unpack(archive)
+        checkpoint = _unpack(archive, poles)
     except _NOT_UNDERSTOOD as error:
         reason = " ".join(str(error).split()) or type(error).__name__
         raise CheckpointError(f"'{path}' cannot be understood: {reason}") from error
@@ -169,7 +172,7 @@ def _pack(checkpoint: Checkpoint) -> bytes:
     return _line(content) + content
 
 
-def _unpack(content: bytes) -> Checkpoint:
+def _unpack(content: bytes, poles: int) -> Checkpoint:
     with np.load(io.BytesIO(content), allow_pickle=False) as archive:
         about: dict[str, Any] = json.loads(archive["about"].tobytes())
         snapshot = Snapshot(
@@ -180,11 +183,11 @@ def _unpack(content: bytes) -> Checkpoint:
             seconds=float(about["seconds"]),
         )
     config = TrainConfig(**about["config"])
-    _check_snapshot(snapshot, config)
+    _check_snapshot(snapshot, config, poles)
     return Checkpoint(config, str(about["model"]), snapshot)
 
 
-def _check_snapshot(snapshot: Snapshot, config: TrainConfig) -> None:
+def _check_snapshot(snapshot: Snapshot, config: TrainConfig, poles: int) -> None:
     """Refuse numbers that no training with this config can have come to.
 
     Raises:
@@ -193,7 +196,8 @@ def _check_snapshot(snapshot: Snapshot, config: TrainConfig) -> None:
     table, columns = snapshot.q_table, snapshot.columns
     n = len(columns.totals)
     expected = {"totals": np.float64, "steps": np.int32, "endings": np.int8}
-    if table.dtype != np.float64 or table.shape != (config.discretizer.n_states, N_ACTIONS):
+    n_states = config.discretizer(poles).n_states
+    if table.dtype != np.float64 or table.shape != (n_states, N_ACTIONS):
         raise ValueError(f"a table of {table.dtype} with shape {table.shape}")
     arrays: dict[str, npt.NDArray[Any]] = columns._asdict()
     if any(

@@ -2,7 +2,7 @@
 
 import logging
 from collections.abc import Callable, Iterator
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numba.core import config, event
@@ -17,6 +17,13 @@ from mjcartpole.learning.episodes import EpisodeLog
 from mjcartpole.learning.loop import in_episode
 from mjcartpole.learning.policy import Policy
 from mjcartpole.learning.qlearning import TabularQ
+from mjcartpole.learning.stepping import (
+    GymPhysics,
+    MujocoPhysics,
+    Physics,
+    PolesPhysics,
+    link,
+)
 from mjcartpole.physics.cartpole_v1 import FORCE
 from mjcartpole.physics.library import libmujoco
 from mjcartpole.physics.model import CartPole, ModelLike, load_model
@@ -37,7 +44,7 @@ def unavailable(backend: Backend, cartpole: CartPole | None = None) -> str:
         return "NUMBA_DISABLE_JIT is set"
     if cartpole is not None and cartpole.model.narena < LEAST_MEMORY:
         return f"{cartpole.name} gives MuJoCo so little memory that it may run out of it"
-    return kernels.link(libmujoco()) if backend == "mujoco" else ""
+    return link(libmujoco()) if backend == "mujoco" else ""
 
 
 class CompiledLoop:
@@ -58,12 +65,13 @@ class CompiledLoop:
             Simulation(load_model(model), integrator) if backend == "mujoco" else None
         )
         self._physics = _physics(self._simulation)
+        self._poles = self._simulation.cartpole.poles if self._simulation else 1
         limit = task.TIME_LIMIT
         self._scratch = kernels.Scratch(
             states=np.zeros(limit + 1, np.int64),
             actions=np.zeros(limit, np.int64),
             rewards=np.zeros(limit, np.float64),
-            failure=np.full(5, -1.0),
+            failure=np.full(3 + 2 * self._poles, -1.0),
             finished=np.zeros(1, np.int64),
         )
 
@@ -145,30 +153,36 @@ class CompiledLoop:
         self._scratch.failure[0] = -1.0
         assert self._simulation is not None
         try:
-            x, x_dot, theta, theta_dot = state
-            check_sane((x, x_dot, theta, theta_dot), self._simulation.cartpole.name)
+            check_sane(tuple(state), self._simulation.cartpole.name)
         except SimulationError as error:
             raise in_episode(error, number, int(steps)) from error
 
 
-def _physics(simulation: Simulation | None) -> kernels.Physics:
+def _physics(simulation: Simulation | None) -> Physics:
     if simulation is None:
-        return kernels.GymPhysics(-FORCE, FORCE)
+        return GymPhysics(-FORCE, FORCE)
     cartpole, model, data = simulation.cartpole, simulation.model, simulation.data
     left, right = cartpole.controls
-    return kernels.MujocoPhysics(
-        model=model._address,
-        data=data._address,
-        qpos=data.qpos,
-        qvel=data.qvel,
-        ctrl=data.ctrl,
-        slider=cartpole.slider,
-        hinge=cartpole.hinge,
-        left=left,
-        right=right,
-        timestep=float(model.opt.timestep),
-        substeps=cartpole.substeps,
-        explicit=simulation.integrator == "gym",
+    common: dict[str, Any] = {
+        "model": model._address,
+        "data": data._address,
+        "qpos": data.qpos,
+        "qvel": data.qvel,
+        "ctrl": data.ctrl,
+        "left": left,
+        "right": right,
+        "timestep": float(model.opt.timestep),
+        "substeps": cartpole.substeps,
+        "explicit": simulation.integrator == "gym",
+    }
+    if cartpole.poles == 1:
+        return MujocoPhysics(slider=cartpole.slider, hinge=cartpole.hinges[0], **common)
+    return PolesPhysics(
+        joints=np.array(cartpole.joints, np.int64),
+        state=np.zeros(simulation.size),
+        seen=np.zeros(simulation.size),
+        moved=np.zeros(len(cartpole.joints)),
+        **common,
     )
 
 

@@ -5,7 +5,7 @@ One place for each number: the command line's flags and their help are derived f
 
 import dataclasses
 from dataclasses import dataclass
-from typing import Any, Final, get_args
+from typing import TYPE_CHECKING, Any, Final, get_args
 
 from mjcartpole import task
 from mjcartpole.envs.backend import Backend, check_backend
@@ -14,10 +14,14 @@ from mjcartpole.integrator import Integrator
 from mjcartpole.learning.discretizer import Discretizer, is_finite
 from mjcartpole.learning.qlearning import Ties
 
+if TYPE_CHECKING:
+    from mjcartpole.physics.model import CartPole
+
 MAX_EPISODES: Final = 1_000_000_000
 """More than anybody waits for; the log of so many takes 13 GB."""
 
-DIMENSIONS: Final = ("x", "x_dot", "theta", "theta_dot")
+_GRID: Final = ("bins", "low", "high")
+_DIMENSIONS: Final = len(task.state_names())
 
 # The article's ranges, as its code has them: the float32 bound of the angle, and 3.5 rad/s.
 _ARTICLE_THETA = float(task.observation_bound()[2])
@@ -38,10 +42,26 @@ _ARTICLE: dict[str, Any] = {
     "learn_last_step": False,
     "log_every": 2_000,
 }
+# Finer for the long pole, which turns slowly; where the cart is counts, how fast it moves does not.
+_TWO_POLES: dict[str, Any] = {
+    "model": "twopoles",
+    "episodes": 30_000,
+    "bins": (3, 1, 8, 8, 8, 8),
+    "low": (-2.0, -0.75, -0.1, -0.4, -0.2095, -1.5),
+    "high": (2.0, 0.75, 0.1, 0.4, 0.2095, 1.5),
+    "gamma": 0.998,
+    "epsilon": 0.1,
+    "decay": 1.0,
+    "q_init_low": 100.0,
+    "q_init_high": 100.0,
+    "td_lambda": 0.95,
+    "log_every": 3_000,
+}
 PRESETS: Final[dict[str, dict[str, Any]]] = {
     "tuned": {},
     "article": _ARTICLE,
     "article-terminal": {**_ARTICLE, "learn_last_step": True},
+    "two-poles": _TWO_POLES,
 }
 """What each preset changes in the defaults of `TrainConfig`, which are those of `tuned`."""
 
@@ -56,6 +76,8 @@ class TrainConfig:
     """A shipped model's name or an MJCF file; backend mujoco only."""
     set: tuple[str, ...] = ()
     """Edits of the model, such as pole.length=1.5 or joint:hinge.damping=0.1."""
+    own_timestep: bool = False
+    """Let a control step be one physics step of the model's file, instead of 0.02 s."""
     integrator: Integrator = "gym"
     """gym: explicit Euler, as CartPole-v1; mujoco: the integrator that the model's file names."""
     episodes: int = 1_500
@@ -63,7 +85,8 @@ class TrainConfig:
     seed: int = 0
     """Seeds the environment and the learner."""
     bins: tuple[int, ...] = (1, 3, 6, 8)
-    """Bins for x, x_dot, theta and theta_dot; 1 ignores a dimension."""
+    """Bins for x, x_dot, theta and theta_dot; 1 ignores a dimension. With several poles the last
+    two hold for each, here and below, unless two more are given for each."""
     low: tuple[float, ...] = (-2.4, -0.75, -0.2095, -1.5)
     """Lower ends of the bins' ranges; what lies outside belongs to the edge bins."""
     high: tuple[float, ...] = (2.4, 0.75, 0.2095, 1.5)
@@ -94,25 +117,23 @@ class TrainConfig:
     """Episodes per row of the printed table."""
 
     def __post_init__(self) -> None:
-        for name in ("bins", "low", "high", "set"):
+        for name in (*_GRID, "set"):
             object.__setattr__(self, name, tuple(getattr(self, name)))
-        check_backend(self.backend, self.model, self.integrator, self.set)
+        own = ("own-timestep",) if self.own_timestep else ()
+        check_backend(self.backend, self.model, self.integrator, (*self.set, *own))
         self._check_counts()
         self._check_numbers()
-        if len(self.bins) != len(DIMENSIONS):
-            raise ConfigError(
-                f"bins needs {len(DIMENSIONS)} values ({', '.join(DIMENSIONS)}), not {self.bins}"
-            )
+        self._check_dimensions()
         if self.ties not in get_args(Ties):
             raise ConfigError(f"ties must be 'first' or 'random', not {self.ties!r}")
-        _ = self.discretizer
+        _ = self.discretizer(self._most_poles)
 
     @classmethod
     def preset(cls, name: str, **changes: Any) -> "TrainConfig":  # noqa: ANN401
         """A preset's config with some fields changed.
 
         Args:
-            name: `tuned`, `article` or `article-terminal`.
+            name: `tuned`, `article`, `article-terminal` or `two-poles`.
             changes: Any field of the config.
 
         Raises:
@@ -128,10 +149,51 @@ class TrainConfig:
             )
         return cls(**{**PRESETS[name], **changes})
 
+    def load_model(self) -> "CartPole":
+        """The model that the config names; for backend gym the reference, which is drawn for it.
+
+        Raises:
+            ModelError: It cannot be used.
+            ConfigError: An edit makes no sense.
+        """
+        from mjcartpole.physics.model import load_model  # noqa: PLC0415 - it imports MuJoCo
+
+        return load_model(self.model, self.set, own_timestep=self.own_timestep)
+
+    def discretizer(self, poles: int = 1) -> Discretizer:
+        """The grid for a model with so many poles.
+
+        >>> TrainConfig(bins=(1, 3, 6, 8)).discretizer(poles=2).bins
+        (1, 3, 6, 8, 6, 8)
+
+        Raises:
+            ConfigError: The config was made for another number of poles.
+        """
+        wanted = len(task.state_names(poles))
+        for name in _GRID:
+            n = len(getattr(self, name))
+            if n not in (_DIMENSIONS, wanted):
+                poled = "1 pole" if poles == 1 else f"{poles} poles"
+                also = f" or {wanted}" if wanted != _DIMENSIONS else ""
+                raise ConfigError(
+                    f"{name} has {n} values, and the model has {poled}; "
+                    f"give {_DIMENSIONS}{also} ({', '.join(task.state_names(poles))})"
+                )
+        bins, low, high = (_for_each_pole(getattr(self, name), poles) for name in _GRID)
+        return Discretizer(bins, low, high)
+
     @property
-    def discretizer(self) -> Discretizer:
-        """The grid that the config describes."""
-        return Discretizer(self.bins, self.low, self.high)
+    def _most_poles(self) -> int:
+        return max(len(getattr(self, name)) for name in _GRID) // 2 - 1
+
+    def _check_dimensions(self) -> None:
+        for name in _GRID:
+            values = getattr(self, name)
+            if len(values) < _DIMENSIONS or len(values) % 2:
+                raise ConfigError(
+                    f"{name} needs {_DIMENSIONS} values ({', '.join(task.state_names())}), and two "
+                    f"more for each further pole, not {values}"
+                )
 
     def _check_counts(self) -> None:
         for name, least in (("episodes", 1), ("log_every", 1), ("seed", 0)):
@@ -153,3 +215,8 @@ class TrainConfig:
                 "q_init_low and q_init_high must be finite, in order and not too far apart, "
                 f"not {low!r} and {high!r}"
             )
+
+
+def _for_each_pole(values: tuple[Any, ...], poles: int) -> tuple[Any, ...]:
+    """Values of the cart and of one pole as values of the cart and of each pole."""
+    return values if len(values) != _DIMENSIONS else values[:2] + values[2:] * poles

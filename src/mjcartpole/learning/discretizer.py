@@ -89,7 +89,7 @@ class Discretizer:
     def _check(self) -> None:
         if not len(self.bins) == len(self.low) == len(self.high):
             raise ConfigError(
-                "bins, low and high need one value per dimension (x, x_dot, theta, theta_dot); "
+                "bins, low and high need one value per dimension of the observation; "
                 f"found {len(self.bins)}, {len(self.low)} and {len(self.high)} values"
             )
         if not all(type(n) is int and n >= 1 for n in self.bins):

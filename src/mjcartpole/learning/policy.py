@@ -53,10 +53,31 @@ class Policy:
         object.__setattr__(self, "_actions", actions.tolist())
 
     def __call__(self, observation: npt.NDArray[np.float32] | Sequence[float]) -> int:
-        """Action for an observation `(x, x_dot, theta, theta_dot)`."""
+        """Action for an observation, one value per dimension of the grid."""
         values = observation.tolist() if isinstance(observation, np.ndarray) else observation
         action: int = self._actions[self.discretizer(values)]  # type: ignore[attr-defined]
         return action
+
+    @property
+    def poles(self) -> int:
+        """How many poles the observation has that the table is for."""
+        return len(self.discretizer.bins) // 2 - 1
+
+    def check_fits(self, poles: int, where: str) -> None:
+        """Refuse to play where the observation is another one than that of the table.
+
+        Args:
+            poles: How many there are.
+            where: What a person calls the place.
+
+        Raises:
+            ConfigError: See above.
+        """
+        if self.poles != poles:
+            raise ConfigError(
+                f"the policy is for {_poles(self.poles)}, and {where} has {_poles(poles)}; "
+                "train one there"
+            )
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the policy to a file, whole or not at all.
@@ -88,6 +109,10 @@ class Policy:
                 "restore it from a copy, or train again"
             )
         return policy
+
+
+def _poles(n: int) -> str:
+    return "1 pole" if n == 1 else f"{n} poles"
 
 
 def _to_text(policy: Policy) -> str:

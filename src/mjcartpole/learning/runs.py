@@ -13,6 +13,7 @@ summary.json    what came out
 
 import contextlib
 import dataclasses
+import functools
 import json
 import os
 import platform
@@ -129,7 +130,7 @@ def check_storable(cartpole: CartPole) -> None:
         ModelError: It refers to other files, such as meshes.
     """
     try:
-        again = load_model(cartpole.xml)
+        again = load_model(cartpole.xml, own_timestep=True)
     except ModelError as error:
         raise ModelError(
             f"{cartpole.name} needs other files beside it, and a run stores one document: {error}"
@@ -280,7 +281,8 @@ def stored_model(document: str, config: TrainConfig) -> CartPole:
     Raises:
         ModelError: The document was damaged.
     """
-    return dataclasses.replace(load_model(document), name=config.model)
+    cartpole = load_model(document, own_timestep=config.own_timestep)
+    return dataclasses.replace(cartpole, name=config.model)
 
 
 def _load_begun(folder: Path, path: Path) -> Begun:
@@ -294,8 +296,8 @@ def _load_begun(folder: Path, path: Path) -> Begun:
         document = (folder / MODEL).read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise RunError(f"'{folder / MODEL}' cannot be read: {error}") from error
-    checkpoint = _checkpoint(folder, path, config, document)
     cartpole = stored_model(document, config)
+    checkpoint = _checkpoint(folder, path, config, cartpole)
     return Begun(folder, preset, video, config, cartpole, checkpoint)
 
 
@@ -323,18 +325,23 @@ def versions() -> dict[str, str]:
     return found
 
 
-def _checkpoint(folder: Path, path: Path, config: TrainConfig, document: str) -> Checkpoint | None:
+def _checkpoint(
+    folder: Path, path: Path, config: TrainConfig, cartpole: CartPole
+) -> Checkpoint | None:
     latest, previous = folder / LATEST, folder / PREVIOUS
+    load = functools.partial(
+        load_checkpoint, config=config, document=cartpole.xml, poles=cartpole.poles
+    )
     if path.is_file():
-        return load_checkpoint(path, config, document)
+        return load(path)
     if not latest.exists():
         # Nothing was saved yet, or it was killed between two moves (see save_checkpoint).
-        return load_checkpoint(previous, config, document) if previous.exists() else None
+        return load(previous) if previous.exists() else None
     try:
-        return load_checkpoint(latest, config, document)
+        return load(latest)
     except CheckpointError as error:
         try:
-            older = load_checkpoint(previous, config, document)
+            older = load(previous)
         except CheckpointError:
             hint = "there is no good one before it; start again with --overwrite"
         else:

@@ -19,7 +19,7 @@ from mjcartpole.learning.loop import learn_episodes
 from mjcartpole.learning.policy import Policy
 from mjcartpole.learning.qlearning import TabularQ
 from mjcartpole.learning.schedules import LinearSchedule
-from mjcartpole.physics.model import CartPole, load_model
+from mjcartpole.physics.model import CartPole
 
 LEARNER_STREAM: Final = 1
 """Spawn key of the learner's generator: its draws are independent of the env's."""
@@ -84,6 +84,7 @@ class Training:
     Attributes:
         config: What is trained.
         engine: Who runs the loop.
+        discretizer: From observations to the learner's states.
         learner: Learns.
         log: The episodes that are finished.
     """
@@ -105,12 +106,18 @@ class Training:
             cartpole: The config's model, if it is loaded already.
 
         Raises:
-            ConfigError: There is no such engine.
+            ConfigError: There is no such engine, or the config's grid is for another number of
+                poles.
             ModelError: The model cannot be used.
         """
         check_engine(engine)
         self.config = config
-        self.learner = _make_learner(config)
+        if config.backend == "gym":
+            cartpole = None
+        elif cartpole is None and env is None:
+            cartpole = config.load_model()
+        self.discretizer = config.discretizer(_count_poles(cartpole, env))
+        self.learner = _make_learner(config, self.discretizer.n_states)
         self.log = EpisodeLog(config.episodes)
         self._env_rng, _ = seeding.np_random(config.seed)
         self._seconds = 0.0
@@ -118,10 +125,6 @@ class Training:
         if env is not None:
             self._env = env
             return
-        if config.backend == "gym":
-            cartpole = None
-        elif cartpole is None:
-            cartpole = load_model(config.model, config.set)
         physics = (config.backend, cartpole or config.model, config.integrator)
         self.engine = choose_engine(engine, config.backend, cartpole)
         if self.engine == "compiled":
@@ -148,23 +151,21 @@ class Training:
             yield finished
 
     def _run_compiled(self, numbers: range) -> Iterator[int]:
-        discretizer = self.config.discretizer
-        return self._loop.learn(self.learner, discretizer, self._env_rng, self.log, numbers)
+        return self._loop.learn(self.learner, self.discretizer, self._env_rng, self.log, numbers)
 
     def _run_python(self, numbers: range) -> Iterator[int]:
         self._env.unwrapped.np_random = self._env_rng
-        for episode in learn_episodes(self._env, self.learner, self.config.discretizer, numbers):
+        for episode in learn_episodes(self._env, self.learner, self.discretizer, numbers):
             self.log.append(episode)
             yield len(self.log)
         self._env.close()
 
     def result(self) -> TrainResult:
         """What has been learned so far; later episodes do not change it."""
-        discretizer = self.config.discretizer
-        table = self.learner.q_table.reshape(*discretizer.bins, task.N_ACTIONS).copy()
+        table = self.learner.q_table.reshape(*self.discretizer.bins, task.N_ACTIONS).copy()
         return TrainResult(
             config=self.config,
-            policy=Policy(discretizer, table),
+            policy=Policy(self.discretizer, table),
             episodes=self.log.copy(),
             seconds=self._seconds,
         )
@@ -212,11 +213,18 @@ def train(config: TrainConfig | None = None, *, engine: Engine = "compiled") -> 
     return training.result()
 
 
-def _make_learner(config: TrainConfig) -> TabularQ:
+def _count_poles(cartpole: CartPole | None, env: gymnasium.Env[Any, Any] | None) -> int:
+    if env is not None:
+        assert env.observation_space.shape is not None
+        return env.observation_space.shape[0] // 2 - 1
+    return 1 if cartpole is None else cartpole.poles
+
+
+def _make_learner(config: TrainConfig, n_states: int) -> TabularQ:
     slope = config.decay * config.episodes
     stream = np.random.SeedSequence(config.seed, spawn_key=(LEARNER_STREAM,))
     rng = np.random.default_rng(stream)
-    shape = (config.discretizer.n_states, task.N_ACTIONS)
+    shape = (n_states, task.N_ACTIONS)
     return TabularQ(
         rng.uniform(config.q_init_low, config.q_init_high, size=shape),
         gamma=config.gamma,

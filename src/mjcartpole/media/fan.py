@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from mjcartpole import task
+from mjcartpole.physics.bodies import pole_bodies
 from mjcartpole.physics.model import CartPole
 
 Points = npt.NDArray[np.float64]
@@ -44,15 +45,13 @@ class Wedge:
 
 
 class Fan:
-    """Where the limits of a cart-pole's angle are, for one state after the other."""
+    """Where the limits of one pole's angle are, for one state after the other."""
 
-    def __init__(self, cartpole: CartPole, model: mujoco.MjModel) -> None:
-        self._index = cartpole.hinge
-        self._joint = int(np.flatnonzero(model.jnt_qposadr == cartpole.hinge)[0])
+    def __init__(self, cartpole: CartPole, pole: int = 0) -> None:
+        model = cartpole.model
+        self._joint = cartpole.hinges[pole]
         self._body = int(model.jnt_bodyid[self._joint])
-        self._geoms = np.flatnonzero(
-            [_is_below(model, body, self._body) for body in model.geom_bodyid]
-        )
+        self._geoms = np.flatnonzero(np.isin(model.geom_bodyid, pole_bodies(cartpole, pole)))
         self._aabb = model.geom_aabb[self._geoms]
         edge = task.THETA_LIMIT + _EDGE_ANGLE
         self._spans = (
@@ -77,7 +76,7 @@ class Fan:
         along = arm / length
         radius = _LENGTH * self._reach(data, centre, along)
         arms = radius * np.array([along, cross(axis, along)])
-        theta = float(data.qpos[self._index])
+        theta = float(data.qpos[self._joint])
         wedges = []
         for angles, rgba in self._spans:
             turned = angles - theta
@@ -108,12 +107,6 @@ def cross(a: Points, b: Points) -> Points:
     """The cross product of two vectors; numpy's takes ten times as long for a single one."""
     (ax, ay, az), (bx, by, bz) = a.tolist(), b.tolist()
     return np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
-
-
-def _is_below(model: mujoco.MjModel, body: int, ancestor: int) -> bool:
-    while body > ancestor:
-        body = int(model.body_parentid[body])
-    return body == ancestor
 
 
 def _arc(start: float, end: float) -> Points:

@@ -80,21 +80,21 @@ def equally_spaced(total: int, count: int) -> list[int]:
 
 
 def last_seconds(
-    total: int, *, seconds: float = 1.0, speed: float = 0.25, fps: int = 50
+    total: int, *, seconds: float = 1.0, speed: float = 0.25, steps_per_second: float = 50.0
 ) -> npt.NDArray[np.float64]:
     """Where in an episode each frame of its slow ending lies.
 
     Args:
-        total: States of the episode, one per control step of 1 / `fps` seconds.
+        total: States of the episode, one per control step.
         seconds: How much of the end is shown; all of a shorter episode.
-        speed: 0.25 shows it four times as slowly.
-        fps: Frames per second of the video, and control steps per second.
+        speed: Control steps per frame: 0.25 shows it four times as slowly as one frame each.
+        steps_per_second: How long a control step takes.
 
     Returns:
         Places, in control steps since the start and not whole ones, the last state's among them;
         for `state_at`.
     """
-    start = max(0.0, total - 1 - seconds * fps)
+    start = max(0.0, total - 1 - seconds * steps_per_second)
     return np.append(start + played(total - start, speed=speed)[:-1], total - 1.0)
 
 
@@ -114,10 +114,10 @@ def played(total: float, *, speed: float = 1.0) -> npt.NDArray[np.float64]:
 
 
 def state_at(states: npt.ArrayLike, place: float) -> npt.NDArray[np.float64]:
-    """The state, shape (4,), at a place between control steps: on a straight line from one to next.
+    """The state at a place between control steps: on a straight line from one to the next.
 
     Args:
-        states: Shape (n, 4).
+        states: One row each.
         place: In control steps since the first state.
     """
     table: npt.NDArray[np.float64] = np.asarray(states, dtype=np.float64)

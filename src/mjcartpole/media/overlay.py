@@ -37,7 +37,7 @@ class Overlay:
     def __init__(self, scene: Scene) -> None:
         """Lay out the strip for a scene's pictures."""
         self._scene = scene
-        self._strip = Strip(scene.width, scene.height)
+        self._strip = Strip(scene.width, scene.height, scene.cartpole.poles)
         self._top: int | None = None
         self._arrows: dict[tuple[int, int], Pixels] = {}
 

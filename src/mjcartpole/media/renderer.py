@@ -36,7 +36,7 @@ class Renderer(Protocol):
     scene: Scene
 
     def render(self, state: npt.ArrayLike) -> npt.NDArray[np.uint8]:
-        """Draw a state `(x, x_dot, theta, theta_dot)`; m, m/s, rad, rad/s.
+        """Draw a state `(x, x_dot, theta, theta_dot, …)`; m, m/s, rad, rad/s.
 
         Returns:
             A new array of shape (height, width, 3), red, green, blue.
@@ -150,7 +150,7 @@ class GLRenderer:
             self._context.release()
 
     def render(self, state: npt.ArrayLike) -> npt.NDArray[np.uint8]:
-        """Draw a state `(x, x_dot, theta, theta_dot)`; m, m/s, rad, rad/s.
+        """Draw a state `(x, x_dot, theta, theta_dot, …)`; m, m/s, rad, rad/s.
 
         Returns:
             A new array of shape (height, width, 3), red, green, blue.

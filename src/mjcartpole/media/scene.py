@@ -51,9 +51,9 @@ class Scene:
         width: Pixels of a picture.
         height: Pixels of a picture.
         level: How much work goes into it.
-        abstract: MuJoCo's scene, filled by `show`: the model's own geoms first, then the fan.
+        abstract: MuJoCo's scene, filled by `show`: the model's own geoms first, then the fans.
         n_geoms: How many of the geoms in it are the model's own.
-        wedges: The parts of the fan.
+        wedges: The parts of the fans, one for each pole.
     """
 
     def __init__(
@@ -86,7 +86,8 @@ class Scene:
             self.abstract.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = 0
         self.n_geoms = 0
         self.wedges: list[Wedge] = []
-        self._fan = Fan(cartpole, self.model)
+        self._joints = list(cartpole.joints)
+        self._fans = [Fan(cartpole, pole) for pole in range(cartpole.poles)]
         self._view: View | None = None
         self._moving = np.flatnonzero(~_is_fixed(self.model, self.model.geom_bodyid))
         self.is_still = _is_view_still(self.model, self._camera)
@@ -108,20 +109,19 @@ class Scene:
         return bool(is_geom and _is_fixed(self.model, self.model.geom_bodyid[geom.objid]))
 
     def show(self, state: npt.ArrayLike) -> None:
-        """Put the cart-pole into a state `(x, x_dot, theta, theta_dot)`; m, m/s, rad, rad/s.
+        """Put the cart-pole into a state `(x, x_dot, theta, theta_dot, …)`; m, m/s, rad, rad/s.
 
         Raises:
             RenderError: It is no state.
         """
-        values = np.asarray(state, dtype=np.float64)
-        if values.shape != (4,) or not np.isfinite(values).all():
+        values, names = np.asarray(state, dtype=np.float64), task.state_names(self.cartpole.poles)
+        if values.shape != (len(names),) or not np.isfinite(values).all():
             raise RenderError(
-                "a picture needs a state of 4 finite numbers (x, x_dot, theta, theta_dot), "
+                f"a picture needs a state of {len(names)} finite numbers ({', '.join(names)}), "
                 f"not {np.array2string(values, threshold=8)} of shape {values.shape}"
             )
         data = self._data
-        data.qpos[self.cartpole.slider] = values[0]
-        data.qpos[self.cartpole.hinge] = values[2]
+        data.qpos[self._joints] = values[0::2]
         mujoco.mj_fwdPosition(self.model, data)
         mujoco.mjv_updateScene(
             self.model,
@@ -135,7 +135,7 @@ class Scene:
         if self._view is None or not self.is_still:
             self._view = View.of(self.abstract, self.width, self.height)
         self.n_geoms = self.abstract.ngeom
-        self.wedges = self._fan.wedges(data)
+        self.wedges = [wedge for fan in self._fans for wedge in fan.wedges(data)]
         for wedge in self.wedges:
             _add_wedge(self.abstract, wedge, self.view)
 

@@ -42,7 +42,7 @@ class SketchRenderer:
         self._backdrop = _backdrop(scene.model)
 
     def render(self, state: npt.ArrayLike) -> npt.NDArray[np.uint8]:
-        """Draw a state `(x, x_dot, theta, theta_dot)`; m, m/s, rad, rad/s.
+        """Draw a state `(x, x_dot, theta, theta_dot, …)`; m, m/s, rad, rad/s.
 
         Returns:
             A new array of shape (height, width, 3), red, green, blue.

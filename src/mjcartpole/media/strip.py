@@ -1,10 +1,12 @@
 """The strip of numbers in a picture with an overlay.
 
-Three blocks of two lines: the step and the return so far, the state with its units, the two
-action values. The strip is kept from frame to frame, and only what changes is written again.
+Blocks of two lines: the step and the return so far, the state with its units (one block more for
+every two further poles), the two action values. The strip is kept from frame to frame, and only
+what changes is written again.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -12,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from mjcartpole.media.lettering import FAINT, INK, PAPER, Colour, Lettering, Pixels
+from mjcartpole.task import state_names
 
 ACTION: Final[Colour] = (0, 146, 118)
 """Of the chosen action, here and at the cart: far from the colours of pole, cart and stops."""
@@ -33,7 +36,7 @@ class Moment:
     Attributes:
         step: Control steps done.
         total: Return so far.
-        state: `(x, x_dot, theta, theta_dot)`; m, m/s, rad, rad/s.
+        state: `(x, x_dot, theta, theta_dot, …)`; m, m/s, rad, rad/s.
         action: 0 pushes to the left (-x), 1 to the right; None shows no arrow.
         values: The action values of the current cell, of action 0 and of action 1; None shows
             none.
@@ -41,7 +44,7 @@ class Moment:
 
     step: int
     total: float
-    state: tuple[float, float, float, float] | npt.NDArray[np.float64]
+    state: Sequence[float] | npt.NDArray[np.float64]
     action: int | None = None
     values: tuple[float, float] | None = None
 
@@ -55,17 +58,28 @@ class _Line:
     has_bar: bool = False
 
 
-_BLOCKS: Final = (
-    (_Line("step", (("step", "00000"),)), _Line("return", (("return", "00000"),))),
-    (
-        _Line("cart", (("x", "+0.00 m"), ("x_dot", "+0.00 m/s"))),
-        _Line("pole", (("theta", "+00.0°"), ("theta_dot", "+000°/s"))),
-    ),
-    (
-        _Line("left", (("value0", "-00.00"),), has_bar=True),
-        _Line("right", (("value1", "-00.00"),), has_bar=True),
-    ),
+_Block = tuple[_Line, ...]
+_PROGRESS: Final = (
+    _Line("step", (("step", "00000"),)),
+    _Line("return", (("return", "00000"),)),
 )
+_VALUES: Final = (
+    _Line("left", (("value0", "-00.00"),), has_bar=True),
+    _Line("right", (("value1", "-00.00"),), has_bar=True),
+)
+_CART: Final = ("+0.00 m", "+0.00 m/s")
+_POLE: Final = ("+00.0°", "+000°/s")
+
+
+def _blocks(poles: int) -> list[_Block]:
+    """What the strip says, block by block."""
+    names = state_names(poles)
+    labels = ["cart", "pole"] if poles == 1 else ["cart", *(f"pole {n + 1}" for n in range(poles))]
+    state = [
+        _Line(label, tuple(zip(names[2 * row : 2 * row + 2], _POLE if row else _CART, strict=True)))
+        for row, label in enumerate(labels)
+    ]
+    return [_PROGRESS, *(tuple(state[row : row + 2]) for row in range(0, len(state), 2)), _VALUES]
 
 
 class Strip:
@@ -75,7 +89,8 @@ class Strip:
         pixels: Shape (height, width, 3); of height 0 where there is no room for any text.
     """
 
-    def __init__(self, width: int, height: int) -> None:
+    def __init__(self, width: int, height: int, poles: int = 1) -> None:
+        self._names, self._blocks = state_names(poles), _blocks(poles)
         size = round(min(height * _FONT_PER_HEIGHT, width * _FONT_PER_WIDTH))
         self._text = Lettering(max(_SMALLEST_FONT, size))
         self._pitch = round(1.25 * self._text.height)
@@ -92,13 +107,15 @@ class Strip:
         """The strip for a moment; the array is the strip's own, and changes with the next one."""
         if not len(self.pixels):
             return self.pixels
-        x, x_dot, theta, theta_dot = (float(value) for value in moment.state)
         self._write("step", f"{moment.step:d}")
         self._write("return", f"{moment.total:g}")
+        x, x_dot, *of_poles = (float(value) for value in moment.state)
         self._write("x", f"{x:+.2f} m")
         self._write("x_dot", f"{x_dot:+.2f} m/s")
-        self._write("theta", f"{math.degrees(theta):+.1f}°")
-        self._write("theta_dot", f"{math.degrees(theta_dot):+.0f}°/s")
+        for index, value in enumerate(of_poles):
+            degrees = math.degrees(value)
+            text = f"{degrees:+.0f}°/s" if index % 2 else f"{degrees:+.1f}°"
+            self._write(self._names[2 + index], text)
         for action in (0, 1):
             self._show_value(action, moment)
         return self.pixels
@@ -127,11 +144,11 @@ class Strip:
 
     def _lay_out(self, width: int) -> Pixels:
         """Place the blocks from left to right, in a further row where one has no room left."""
-        free = width - 2 * self._pad - sum(self._block_width(block) for block in _BLOCKS)
+        free = width - 2 * self._pad - sum(self._block_width(block) for block in self._blocks)
         # Where it is narrow, the bars are the first to give way.
         gap = max(self._text.size, min(free // 2, 6 * self._text.size))
         self._bar_width = max(self._bar_width + min(0, free - 2 * gap), self._text.size)
-        widths = [self._block_width(block) for block in _BLOCKS]
+        widths = [self._block_width(block) for block in self._blocks]
         self._needed = max(widths) + 2 * self._pad
         places, left, row = [], self._pad, 0
         for block_width in widths:
@@ -142,11 +159,11 @@ class Strip:
         height = 2 * self._pad + (2 * row + 1) * self._pitch + self._text.height
         strip = np.full((height, width, 3), PAPER, np.uint8)
         strip[: max(1, self._text.size // 12)] = _LINE
-        for block, (left, top) in zip(_BLOCKS, places, strict=True):
+        for block, (left, top) in zip(self._blocks, places, strict=True):
             self._place_block(strip, block, left, top)
         return strip
 
-    def _place_block(self, strip: Pixels, block: tuple[_Line, _Line], left: int, top: int) -> None:
+    def _place_block(self, strip: Pixels, block: _Block, left: int, top: int) -> None:
         text = self._text
         for index, line in enumerate(block):
             row = strip[top + index * self._pitch :][: text.height]
@@ -162,17 +179,17 @@ class Strip:
                 start += text.size // 2
                 self._bars.append(row[inset:-inset, start : start + self._bar_width])
 
-    def _label_width(self, block: tuple[_Line, _Line]) -> int:
+    def _label_width(self, block: _Block) -> int:
         widths = [self._text.line(line.label).shape[1] for line in block]
         return int(max(widths))
 
-    def _field_widths(self, block: tuple[_Line, _Line]) -> list[int]:
+    def _field_widths(self, block: _Block) -> list[int]:
         """Widths of the columns of fields, each with a gap on its left."""
         columns = zip(*(line.fields for line in block), strict=True)
         gap = self._text.size * 2 // 3
         return [gap + max(self._text.width(text) for _, text in column) for column in columns]
 
-    def _block_width(self, block: tuple[_Line, _Line]) -> int:
+    def _block_width(self, block: _Block) -> int:
         bar = self._text.size // 2 + self._bar_width if block[0].has_bar else 0
         return self._label_width(block) + sum(self._field_widths(block)) + bar
 

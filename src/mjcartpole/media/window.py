@@ -10,7 +10,6 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
-from mjcartpole import task
 from mjcartpole.media.scene import DEFAULT_CAMERA
 from mjcartpole.media.trial import try_backend
 from mjcartpole.physics.model import CartPole
@@ -25,7 +24,7 @@ class Window(Protocol):
     """Shows states, one per control step."""
 
     def show(self, state: npt.NDArray[np.float64]) -> None:
-        """Show a state `(x, x_dot, theta, theta_dot)`."""
+        """Show a state `(x, x_dot, theta, theta_dot, …)`."""
 
     def close(self) -> None:
         """Close the window."""
@@ -79,10 +78,9 @@ class ViewerWindow:
         if not self._viewer.is_running():
             return
         time.sleep(max(0.0, self._next_frame - time.monotonic()))
-        self._next_frame = time.monotonic() + task.CONTROL_STEP
+        self._next_frame = time.monotonic() + self._cartpole.control_step
         with self._viewer.lock():
-            self._data.qpos[self._cartpole.slider] = state[0]
-            self._data.qpos[self._cartpole.hinge] = state[2]
+            self._data.qpos[list(self._cartpole.joints)] = state[0::2]
             mujoco.mj_kinematics(self._cartpole.model, self._data)
         self._viewer.sync()
 

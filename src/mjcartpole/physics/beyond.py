@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import mujoco
 import numpy as np
 
+from mjcartpole.physics.bodies import moving_bodies
 from mjcartpole.physics.model import CartPole
 from mjcartpole.physics.parameters import (
     TILT,
@@ -16,8 +17,8 @@ from mjcartpole.physics.parameters import (
     forces_of,
     joint_label,
     label,
-    moving_bodies,
     pole_of,
+    several_poles,
 )
 
 
@@ -32,7 +33,8 @@ def beyond_equations(cartpole: CartPole) -> list[str]:
         One phrase each; empty if the equations cover the model.
     """
     found: list[str] = []
-    for look in (_directions, _joints, _actuator, _contacts, _ties, _surroundings, _switches):
+    parts = (_poles, _directions, _joints, _actuator)
+    for look in (*parts, _contacts, _ties, _surroundings, _switches):
         found.extend(look(cartpole))
     return found
 
@@ -79,23 +81,34 @@ def overridden_masses(cartpole: CartPole) -> list[str]:
     ]
 
 
+def _poles(cartpole: CartPole) -> Iterator[str]:
+    if cartpole.poles > 1:
+        yield several_poles(cartpole)
+
+
 def _directions(cartpole: CartPole) -> Iterator[str]:
-    """Tilted axes, and a pole that does not stand at angle 0."""
-    model, axes = cartpole.model, axes_of(cartpole)
-    slider, hinge = joint_label(model, cartpole.slider), joint_label(model, cartpole.hinge)
-    if abs(axes.slider[2]) > TILT:
+    """Tilted axes, and poles that do not stand at angle 0."""
+    slider = joint_label(cartpole.model, cartpole.slider)
+    if abs(axes_of(cartpole).slider[2]) > TILT:
         yield f"slide axis of {slider} is tilted, not horizontal"
+    for pole in range(cartpole.poles):
+        yield from _directions_of(cartpole, pole, slider)
+
+
+def _directions_of(cartpole: CartPole, pole: int, slider: str) -> Iterator[str]:
+    model, axes, joint = cartpole.model, axes_of(cartpole, pole), cartpole.hinges[pole]
+    hinge = joint_label(model, joint)
     if abs(axes.hinge[2]) > TILT:
         yield f"hinge axis of {hinge} is tilted, not horizontal"
     if abs(axes.hinge @ axes.slider) > TILT:
         yield f"hinge axis of {hinge} is not perpendicular to the slide axis of {slider}"
-    same_body = model.jnt_bodyid[cartpole.slider] == model.jnt_bodyid[cartpole.hinge]
-    if same_body and cartpole.hinge < cartpole.slider:
+    same_body = model.jnt_bodyid[cartpole.slider] == model.jnt_bodyid[joint]
+    if same_body and joint < cartpole.slider:
         yield f"slide axis of {slider} turns with the pole: {hinge} comes first in the same body"
-    com = axes.pole_frame @ pole_of(model, cartpole.hinge).com
+    com = axes.pole_frame @ pole_of(cartpole, pole).com
     beside = float(com @ axes.slider)
     if abs(beside) > TILT * np.abs(com).max():
-        ref = float(model.qpos0[cartpole.hinge])
+        ref = float(model.qpos0[joint])
         reason = f" (its ref is {ref:g} rad)" if ref else ""
         yield (
             f"the pole's centre of mass is {abs(beside):.3g} m beside {hinge} at angle 0{reason}"
@@ -106,7 +119,7 @@ def _joints(cartpole: CartPole) -> Iterator[str]:
     """Limits, friction loss, springs and damping that is not viscous."""
     model, bit = cartpole.model, mujoco.mjtDisableBit
     solver = _on(model, bit.mjDSBL_CONSTRAINT)
-    for joint in (cartpole.slider, cartpole.hinge):
+    for joint in cartpole.joints:
         name = joint_label(model, joint)
         if model.jnt_limited[joint] and solver and _on(model, bit.mjDSBL_LIMIT):
             low, high = model.jnt_range[joint]

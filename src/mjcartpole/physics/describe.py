@@ -10,6 +10,7 @@ import numpy as np
 from mjcartpole import task
 from mjcartpole.errors import ModelError
 from mjcartpole.physics.beyond import beyond_equations, beyond_step
+from mjcartpole.physics.bodies import cart_bodies, mass_of, pole_bodies
 from mjcartpole.physics.model import CartPole
 from mjcartpole.physics.parameters import read_parameters
 from mjcartpole.physics.structure import LEAST_ARM, Directions, Vector, directions, is_servo, push
@@ -24,19 +25,57 @@ _NOTHING: Final = 1e-9
 
 
 @dataclass(frozen=True)
+class PoleDescription:
+    """One pole.
+
+    Attributes:
+        joint: The hinge joint and its body.
+        mass: All that turns on the hinge, without a pole that stands on it, kg.
+        com_distance: From the hinge to the pole's centre of mass, m.
+        upright: The hinge's angle in the document at which the model's angle is 0, rad.
+        balance: The model's angle at which the centre of mass is straight above the hinge, rad.
+        leans: 1 if a positive angle leans to positive x, -1 if it leans to negative x.
+    """
+
+    joint: str
+    mass: float
+    com_distance: float
+    upright: float
+    balance: float
+    leans: int
+
+    def what(self) -> str:
+        """What it is, in words."""
+        arm = f"centre of mass {self.com_distance:.6g} m from the hinge"
+        if self.com_distance < LEAST_ARM:
+            arm = "centre of mass on the hinge, so that it cannot fall"
+        return f"{self.joint}, {self.mass:.6g} kg, {arm}"
+
+    def angle(self) -> str:
+        """From where its angle is counted, in words."""
+        side = "+x" if self.leans > 0 else "-x"
+        words = f"0 is upright, a positive angle leans to {side} of the rail"
+        if self.upright:
+            words += (
+                f"; the file has upright at {math.degrees(self.upright):.6g} degrees, "
+                "angles are counted from there"
+            )
+        if abs(self.balance) > _NOTHING:
+            words += f"; it balances at {math.degrees(self.balance):.3g} degrees"
+        return words
+
+
+@dataclass(frozen=True)
 class Description:
     """A cart-pole in a person's words and numbers; `text()` has it in lines.
 
     Attributes:
         name: What a person calls the model.
         cart: The slide joint and its body.
-        pole: The hinge joint and its body.
+        poles: One description each, in the order of the state's values.
         rail: World axis of the rail, where positive x goes: `"+x"`, `"-y"`, or three numbers.
         up: World axis that gravity points away from: `"+z"`.
         gravity: m/s^2, shape (3,).
-        upright: The hinge's angle in the document at which the model's angle is 0, rad.
-        balance: The model's angle at which the centre of mass is straight above the hinge, rad.
-        leans: 1 if a positive angle leans to positive x, -1 if it leans to negative x.
         forces: Push along the rail by action 0 and by action 1 at rest, N.
         servo: Whether the force depends on position or velocity too; `forces` are those at x = 0.
         gear: The actuator's.
@@ -45,8 +84,6 @@ class Description:
         substeps: Physics steps per control step.
         integrator: As the document names it.
         cart_mass: All that slides but does not turn, kg.
-        pole_mass: All that turns, kg.
-        com_distance: From the hinge to the pole's centre of mass, m.
         rail_limits: Ends of the rail, m; None without.
         beyond: What acts on the motion and is not in the closed-form equations; empty where
             they apply.
@@ -55,13 +92,10 @@ class Description:
 
     name: str
     cart: str
-    pole: str
+    poles: tuple[PoleDescription, ...]
     rail: str
     up: str
     gravity: tuple[float, float, float]
-    upright: float
-    balance: float
-    leans: int
     forces: tuple[float, float]
     servo: bool
     gear: float
@@ -70,8 +104,6 @@ class Description:
     substeps: int
     integrator: str
     cart_mass: float
-    pole_mass: float
-    com_distance: float
     rail_limits: tuple[float, float] | None
     beyond: tuple[str, ...]
     beyond_step: tuple[str, ...]
@@ -90,10 +122,10 @@ class Description:
         """The description in lines, each with a label."""
         lines = [
             ("cart", f"{self.cart}, {self.cart_mass:.6g} kg"),
-            ("pole", f"{self.pole}, {self.pole_mass:.6g} kg, {self._arm()}"),
+            *((f"pole{number}", pole.what()) for number, pole in self._numbered()),
             ("rail", f"along {self.rail}{self._limits()}"),
             ("up", f"{self.up}; gravity {_numbers(self.gravity)} m/s^2"),
-            ("angle", self._angle()),
+            *((f"angle{number}", pole.angle()) for number, pole in self._numbered()),
             ("force", self._force()),
             ("time", self._time()),
             ("integrator", self.integrator),
@@ -101,28 +133,17 @@ class Description:
         ]
         return [f"{label:<{_LABEL_WIDTH}}{words}" for label, words in lines]
 
-    def _arm(self) -> str:
-        if self.com_distance < LEAST_ARM:
-            return "centre of mass on the hinge, so that it cannot fall"
-        return f"centre of mass {self.com_distance:.6g} m from the hinge"
+    def _numbered(self) -> list[tuple[str, PoleDescription]]:
+        """Each pole with what tells it from the others; nothing where there is one."""
+        if len(self.poles) == 1:
+            return [("", self.poles[0])]
+        return [(f" {number}", pole) for number, pole in enumerate(self.poles, start=1)]
 
     def _limits(self) -> str:
         if self.rail_limits is None:
             return f", no ends; an episode ends at {task.X_LIMIT:g} m"
         low, high = self.rail_limits
         return f", ends at {low:g} m and {high:g} m"
-
-    def _angle(self) -> str:
-        side = "+x" if self.leans > 0 else "-x"
-        words = f"0 is upright, a positive angle leans to {side} of the rail"
-        if self.upright:
-            words += (
-                f"; the file has upright at {math.degrees(self.upright):.6g} degrees, "
-                "angles are counted from there"
-            )
-        if abs(self.balance) > _NOTHING:
-            words += f"; it balances at {math.degrees(self.balance):.3g} degrees"
-        return words
 
     def _force(self) -> str:
         (left, right), (low, high) = self.forces, self.controls
@@ -152,22 +173,17 @@ def describe(cartpole: CartPole) -> Description:
     Args:
         cartpole: A loaded model.
     """
-    model, found = cartpole.model, directions(cartpole)
-    slider, hinge = cartpole.slider, cartpole.hinge
-    moving = float(model.body_subtreemass[model.jnt_bodyid[slider]])
-    pole_mass = float(model.body_subtreemass[model.jnt_bodyid[hinge]])
+    model, slider = cartpole.model, cartpole.slider
+    found = [directions(cartpole, pole) for pole in range(cartpole.poles)]
     low, high = (push(model, slider, control) for control in cartpole.controls)
     limits = [float(end) for end in model.jnt_range[slider]]
     return Description(
         name=cartpole.name,
         cart=_joint(model, slider),
-        pole=_joint(model, hinge),
-        rail=axis_name(found.rail),
-        up=axis_name(found.up),
+        poles=tuple(_pole(cartpole, pole, found[pole]) for pole in range(cartpole.poles)),
+        rail=axis_name(found[0].rail),
+        up=axis_name(found[0].up),
         gravity=tuple(model.opt.gravity.tolist()),
-        upright=cartpole.upright,
-        balance=found.upright,
-        leans=1 if found.coupling > 0 else -1,
         forces=(low, high),
         servo=is_servo(model),
         gear=float(model.actuator_gear[0, 0]),
@@ -175,12 +191,21 @@ def describe(cartpole: CartPole) -> Description:
         timestep=cartpole.timestep,
         substeps=cartpole.substeps,
         integrator=cartpole.integrator,
-        cart_mass=moving - pole_mass,
-        pole_mass=pole_mass,
-        com_distance=float(np.linalg.norm(found.arm)),
+        cart_mass=mass_of(model, cart_bodies(cartpole)),
         rail_limits=(limits[0], limits[1]) if model.jnt_limited[slider] else None,
-        beyond=_beyond(cartpole, found),
+        beyond=_beyond(cartpole, found[0]),
         beyond_step=tuple(beyond_step(cartpole)),
+    )
+
+
+def _pole(cartpole: CartPole, pole: int, found: Directions) -> PoleDescription:
+    return PoleDescription(
+        joint=_joint(cartpole.model, cartpole.hinges[pole]),
+        mass=mass_of(cartpole.model, pole_bodies(cartpole, pole)),
+        com_distance=float(np.linalg.norm(found.arm)),
+        upright=cartpole.upright[pole],
+        balance=found.upright,
+        leans=1 if found.coupling > 0 else -1,
     )
 
 
@@ -196,7 +221,8 @@ def _beyond(cartpole: CartPole, found: Directions) -> tuple[str, ...]:
     """What keeps the equations from covering a model; they have z up."""
     reasons = beyond_equations(cartpole)
     try:
-        read_parameters(cartpole)
+        if cartpole.poles == 1:
+            read_parameters(cartpole)
     except ModelError as error:
         reasons.append(str(error))
     if not found.up[2] and not reasons:

@@ -18,7 +18,7 @@ from mjcartpole.physics.addresses import find_element, known_attributes, label_o
 from mjcartpole.physics.beyond import beyond_equations, beyond_step
 from mjcartpole.physics.document import Document, Element
 from mjcartpole.physics.equations import CARTPOLE_V1, Parameters
-from mjcartpole.physics.meaning import MEANINGS, apply_meanings
+from mjcartpole.physics.meaning import MEANINGS, apply_meanings, meaning_of
 from mjcartpole.physics.model import CartPole
 from mjcartpole.physics.parameters import differences, read_parameters
 from mjcartpole.physics.parts import number_text
@@ -57,7 +57,8 @@ def parse_edit(text: str) -> tuple[str, float | str]:
     if len(value) >= 2 and value[0] == value[-1] and value[0] in "\"'":
         value = value[1:-1]
     check_key(key)
-    return key, MEANINGS[key].check(key, value) if key in MEANINGS else value
+    meaning = meaning_of(key)
+    return key, value if meaning is None else meaning.check(key, value)
 
 
 def edits_of(edits: Mapping[str, object] | Sequence[str]) -> dict[str, object]:
@@ -82,7 +83,7 @@ def check_key(key: str) -> None:
     Raises:
         ConfigError: It is neither an edit by meaning nor an element and attribute of MJCF.
     """
-    if key in MEANINGS:
+    if meaning_of(key):
         return
     tag = re.split(r"[.:]", key, maxsplit=1)[0]
     if tag not in schema_tags():
@@ -104,7 +105,8 @@ def edit_document(document: str, edits: Mapping[str, object]) -> str:
 
     Args:
         document: An MJCF, whole.
-        edits: By meaning (see `EDIT_NAMES`) a number; by element, "tag:name.attribute" or
+        edits: By meaning (see `EDIT_NAMES`) a number, and where there are several poles with the
+            pole's number, as pole2.length; by element, "tag:name.attribute" or
             "tag.attribute" where it is the only one, with steps into an element by dots
             (body:pole.inertial.mass, default:stop.geom.size): text, a number, or several numbers.
 
@@ -117,10 +119,11 @@ def edit_document(document: str, edits: Mapping[str, object]) -> str:
     if not edits:
         return document
     edited = Document(document)
-    meanings = {key: MEANINGS[key].check(key, edits[key]) for key in MEANINGS if key in edits}
-    if meanings:
-        apply_meanings(edited, meanings)
-    _apply_elements(edited, {key: edits[key] for key in sorted(edits) if key not in MEANINGS})
+    meanings = {key: meaning_of(key) for key in edits}
+    values = {key: found.check(key, edits[key]) for key, found in meanings.items() if found}
+    if values:
+        apply_meanings(edited, values)
+    _apply_elements(edited, {key: edits[key] for key in sorted(edits) if key not in values})
     return edited.text
 
 
@@ -148,8 +151,8 @@ def differs_from(cartpole: CartPole, reference: Parameters = CARTPOLE_V1) -> lis
     Raises:
         ModelError: Its parameters make no sense.
     """
-    own = read_parameters(cartpole)
-    return differences(own, reference) + beyond_equations(cartpole) + beyond_step(cartpole)
+    own = differences(read_parameters(cartpole), reference) if cartpole.poles == 1 else []
+    return own + beyond_equations(cartpole) + beyond_step(cartpole)
 
 
 def _apply_elements(document: Document, edits: Mapping[str, object]) -> None:

@@ -1,6 +1,7 @@
 """Edits by meaning: what each name stands for, and that it is what the compiled model then has."""
 
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
@@ -11,16 +12,12 @@ import numpy.typing as npt
 
 from mjcartpole.errors import ConfigError
 from mjcartpole.physics.addresses import find_element
+from mjcartpole.physics.bodies import cart_bodies, mass_of
 from mjcartpole.physics.document import Document
 from mjcartpole.physics.model import CartPole, load_model
 from mjcartpole.physics.parameters import forces_of, pole_of
 from mjcartpole.physics.parts import Parts, number_text
-from mjcartpole.physics.rescale import (
-    cart_mass,
-    set_cart_mass,
-    set_length,
-    set_pole_mass,
-)
+from mjcartpole.physics.rescale import set_cart_mass, set_length, set_pole_mass
 
 
 @dataclass(frozen=True)
@@ -73,11 +70,23 @@ MEANINGS: Final = {
 }
 """In the order in which they are made."""
 
+_OF_POLE: Final = ("pole.", "hinge.")
+_NUMBERED: Final = re.compile(r"^(pole|hinge)([1-9]\d*)\.")
+"""Of one of several poles."""
+
 _JOINT_ATTRIBUTES: Final = {
     "damping": "damping",
     "friction": "frictionloss",
     "armature": "armature",
 }
+
+
+def meaning_of(key: str) -> Meaning | None:
+    """What an edit by meaning stands for; None where a key is none.
+
+    Where there are several poles, a number says which: pole2.length, hinge1.damping.
+    """
+    return MEANINGS.get(_NUMBERED.sub(r"\1.", key))
 
 
 def apply_meanings(document: Document, values: Mapping[str, float]) -> None:
@@ -91,25 +100,64 @@ def apply_meanings(document: Document, values: Mapping[str, float]) -> None:
         ConfigError: The document leaves no room for an edit; the reason is said.
         ModelError: The document is no cart-pole, or is none afterwards.
     """
-    before, centre = _load(document), None
-    _edit_options(document, before.model, values)
+    cartpole = _load(document)
+    whole, by_pole = _sort_by_pole(values, cartpole.poles)
+    _edit_options(document, cartpole.model, whole)
     parts = Parts(document)
-    _edit_joints(parts, before, values)
-    if "force" in values:
-        _edit_force(parts, before, values["force"])
-    if "cart.mass" in values:
-        set_cart_mass(parts, before, values["cart.mass"])
-    if "pole.length" in values or "pole.mass" in values:
-        pole, longer = pole_of(before.model, before.hinge), 1.0
-        if "pole.length" in values:
-            longer = set_length(parts, before, values["pole.length"])
-            before = _load(document)
-        set_pole_mass(parts, before, values.get("pole.mass", pole.mass))
-        centre = longer * pole.com
+    _edit_joint(parts, cartpole, cartpole.slider, "rail", whole)
+    if "force" in whole:
+        _edit_force(parts, cartpole, whole["force"])
+    if "cart.mass" in whole:
+        set_cart_mass(parts, cartpole, whole["cart.mass"])
+    centres = [_edit_pole(document, cartpole, pole, wanted) for pole, wanted in enumerate(by_pole)]
     after = _load(document)
-    _check_outcome(after, values)
-    if centre is not None:
-        _check_centre(after, centre)
+    _check_outcome(_found(after), whole)
+    for pole, wanted in enumerate(by_pole):
+        _check_outcome(_found_of_pole(after, pole), wanted)
+        _check_centre(after, pole, centres[pole])
+
+
+def _sort_by_pole(
+    values: Mapping[str, float], poles: int
+) -> tuple[dict[str, float], list[dict[str, float]]]:
+    """Edits of the whole, and those of each pole without its number.
+
+    Raises:
+        ConfigError: It is not clear which pole, or there is no such pole.
+    """
+    whole: dict[str, float] = {}
+    by_pole: list[dict[str, float]] = [{} for _ in range(poles)]
+    for key, value in values.items():
+        numbered = _NUMBERED.match(key)
+        plain = _NUMBERED.sub(r"\1.", key)
+        if numbered is None and not plain.startswith(_OF_POLE):
+            whole[key] = value
+            continue
+        names = [plain]
+        if poles > 1:
+            names = [plain.replace(".", f"{pole + 1}.", 1) for pole in range(poles)]
+        if key not in names:
+            has = "1 pole" if poles == 1 else f"{poles} poles"
+            raise ConfigError(
+                f"{key!r} names no pole of the model, it has {has}; use {' or '.join(names)}"
+            )
+        by_pole[names.index(key)][plain] = value
+    return whole, by_pole
+
+
+def _edit_pole(
+    document: Document, before: CartPole, pole: int, values: Mapping[str, float]
+) -> npt.NDArray[np.float64]:
+    """Make the edits of one pole; returns where its centre of mass must then be, from the hinge."""
+    wanted, longer = pole_of(before, pole), 1.0
+    if values:
+        _edit_joint(Parts(document), before, before.hinges[pole], "hinge", values)
+    if "pole.length" in values:
+        longer = set_length(Parts(document), before, values["pole.length"], pole)
+    if "pole.length" in values or "pole.mass" in values:
+        mass = values.get("pole.mass", wanted.mass)
+        set_pole_mass(Parts(document), _load(document), mass, pole)
+    return longer * wanted.com
 
 
 def _load(document: Document) -> CartPole:
@@ -130,17 +178,18 @@ def _edit_options(document: Document, model: mujoco.MjModel, values: Mapping[str
         document.set(option, name, number_text(values["timestep"], written))
 
 
-def _edit_joints(parts: Parts, cartpole: CartPole, values: Mapping[str, float]) -> None:
-    for part, joint in (("hinge", cartpole.hinge), ("rail", cartpole.slider)):
-        for word, name in _JOINT_ATTRIBUTES.items():
-            value = values.get(f"{part}.{word}")
-            if value is None:
-                continue
-            element = parts.joint(cartpole.model, joint)
-            tokens = element.attributes.get(name, "").split() or [""]
-            tokens[0] = number_text(value, tokens[0])
-            if name in element.attributes or value != _joint_value(cartpole, joint, name):
-                parts.document.set(element, name, " ".join(tokens))
+def _edit_joint(
+    parts: Parts, cartpole: CartPole, joint: int, part: str, values: Mapping[str, float]
+) -> None:
+    for word, name in _JOINT_ATTRIBUTES.items():
+        value = values.get(f"{part}.{word}")
+        if value is None:
+            continue
+        element = parts.joint(cartpole.model, joint)
+        tokens = element.attributes.get(name, "").split() or [""]
+        tokens[0] = number_text(value, tokens[0])
+        if name in element.attributes or value != _joint_value(cartpole, joint, name):
+            parts.document.set(element, name, " ".join(tokens))
 
 
 def _joint_value(cartpole: CartPole, joint: int, name: str) -> float:
@@ -169,9 +218,9 @@ def _edit_force(parts: Parts, cartpole: CartPole, force: float) -> None:
         parts.document.set(element, "gear", " ".join(tokens))
 
 
-def _check_centre(cartpole: CartPole, wanted: npt.NDArray[np.float64]) -> None:
+def _check_centre(cartpole: CartPole, pole: int, wanted: npt.NDArray[np.float64]) -> None:
     """All that turns on the hinge must have become longer in the same proportion."""
-    found = pole_of(cartpole.model, cartpole.hinge).com
+    found = pole_of(cartpole, pole).com
     if np.abs(found - wanted).max() > 1e-9 * np.abs(wanted).max():
         raise ConfigError(
             f"pole.length cannot be set: the centre of mass would be {np.linalg.norm(found):g} m "
@@ -180,19 +229,32 @@ def _check_centre(cartpole: CartPole, wanted: npt.NDArray[np.float64]) -> None:
         )
 
 
-def _check_outcome(cartpole: CartPole, values: Mapping[str, float]) -> None:
-    """What was asked must be what the model has, whatever else the document says."""
+def _found(cartpole: CartPole) -> dict[str, float]:
+    """What a model has, by the names of the edits of the whole."""
     model = cartpole.model
-    found = {
-        "pole.mass": pole_of(model, cartpole.hinge).mass,
-        "cart.mass": cart_mass(cartpole),
+    return {
+        "cart.mass": mass_of(model, cart_bodies(cartpole)),
         "gravity": -float(model.opt.gravity[2]),
         "force": abs(forces_of(cartpole)[1]),
         "timestep": float(model.opt.timestep),
+        **_found_of_joint(cartpole, cartpole.slider, "rail"),
     }
-    for part, joint in (("hinge", cartpole.hinge), ("rail", cartpole.slider)):
-        for word, name in _JOINT_ATTRIBUTES.items():
-            found[f"{part}.{word}"] = _joint_value(cartpole, joint, name)
+
+
+def _found_of_pole(cartpole: CartPole, pole: int) -> dict[str, float]:
+    mass = pole_of(cartpole, pole).mass
+    return {"pole.mass": mass, **_found_of_joint(cartpole, cartpole.hinges[pole], "hinge")}
+
+
+def _found_of_joint(cartpole: CartPole, joint: int, part: str) -> dict[str, float]:
+    return {
+        f"{part}.{word}": _joint_value(cartpole, joint, name)
+        for word, name in _JOINT_ATTRIBUTES.items()
+    }
+
+
+def _check_outcome(found: Mapping[str, float], values: Mapping[str, float]) -> None:
+    """What was asked must be what the model has, whatever else the document says."""
     for key, value in values.items():
         if key in found and not math.isclose(found[key], value, rel_tol=1e-9):
             raise ConfigError(

@@ -1,7 +1,7 @@
 """Load an MJCF, check that it is a cart-pole, and find its parts.
 
-A cart-pole is one slide joint (the cart's), one hinge joint below it (the pole's), and one
-actuator that pushes along the slider. Names do not matter; structure does.
+A cart-pole is one slide joint (the cart's), a hinge joint below it for each pole, and one actuator
+that pushes along the slider. Names do not matter; structure does.
 """
 
 import copy
@@ -22,6 +22,7 @@ from mjcartpole.physics.reading import read_text, stand_alone
 from mjcartpole.physics.soundness import check_motion, check_numbers
 from mjcartpole.physics.structure import (
     check_directions,
+    check_independent,
     check_limits,
     count_from_upright,
     find_controls,
@@ -42,10 +43,10 @@ class CartPole:
         xml: The whole document as text; it compiles to the same model anywhere.
         model: The compiled model.
         slider: Index of the cart's joint in qpos and qvel.
-        hinge: Index of the pole's joint in qpos and qvel.
+        hinges: Index of each pole's joint in qpos and qvel, in the document's order.
         controls: The actuator's control for action 0 and for action 1.
-        substeps: Physics steps per control step of 0.02 s.
-        upright: The hinge's angle as the document counts it at which the model's angle is 0, rad.
+        substeps: Physics steps per control step.
+        upright: Each hinge's angle as the document counts it at which the model's angle is 0, rad.
             It is 0 but where a document has the pole hang, or lie, at its own angle 0.
     """
 
@@ -53,15 +54,30 @@ class CartPole:
     xml: str
     model: mujoco.MjModel
     slider: int
-    hinge: int
+    hinges: tuple[int, ...]
     controls: tuple[float, float]
     substeps: int
-    upright: float = 0.0
+    upright: tuple[float, ...]
+
+    @property
+    def poles(self) -> int:
+        """How many poles it has."""
+        return len(self.hinges)
+
+    @property
+    def joints(self) -> tuple[int, ...]:
+        """Indices in qpos and qvel in the order of a state: the slider, then each hinge."""
+        return (self.slider, *self.hinges)
 
     @property
     def timestep(self) -> float:
         """Seconds of one physics step."""
         return float(self.model.opt.timestep)
+
+    @property
+    def control_step(self) -> float:
+        """Seconds between two actions."""
+        return self.timestep * self.substeps
 
     @property
     def integrator(self) -> str:
@@ -256,14 +272,22 @@ def self_contained(text: str, folder: Path) -> str:
 
 def _find_parts(name: str, xml: str, model: mujoco.MjModel, own_timestep: bool) -> CartPole:
     check_numbers(name, model)
-    slider, hinge = find_joints(name, model)
+    slider, hinges = find_joints(name, model)
     controls = find_controls(name, model, slider)
     substeps = 1 if own_timestep else find_substeps(name, model)
-    cartpole = CartPole(name, xml, model, slider, hinge, controls, substeps)
-    upright = check_directions(name, cartpole).upright
-    if abs(upright) > task.THETA_LIMIT:
-        upright = count_from_upright(name, cartpole, upright)
-        cartpole = dataclasses.replace(cartpole, upright=upright)
+    cartpole = CartPole(name, xml, model, slider, hinges, controls, substeps, (0.0,) * len(hinges))
+    # From the cart outwards: which way a pole on a pole stands depends on the one below it.
+    upright = tuple(_count_from_upright(name, cartpole, pole) for pole in range(cartpole.poles))
+    cartpole = dataclasses.replace(cartpole, upright=upright)
     check_limits(name, cartpole)
+    check_independent(name, cartpole)
     check_motion(name, cartpole)
     return cartpole
+
+
+def _count_from_upright(name: str, cartpole: CartPole, pole: int) -> float:
+    """Have a pole's angle count from upright, if it does not; returns the angle that became 0."""
+    upright = check_directions(name, cartpole, pole).upright
+    if abs(upright) <= task.THETA_LIMIT:
+        return 0.0
+    return count_from_upright(name, cartpole, pole, upright)

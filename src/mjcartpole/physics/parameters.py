@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from mjcartpole.errors import ModelError, NotACartPoleError
+from mjcartpole.physics.bodies import cart_bodies, mass_of, pole_bodies
 from mjcartpole.physics.equations import Parameters
 from mjcartpole.physics.model import CartPole
 
@@ -33,17 +34,20 @@ def read_parameters(cartpole: CartPole) -> Parameters:
 
     Raises:
         NotACartPoleError: The pole has no mass.
-        ModelError: A number of the model makes no sense in the equations.
+        ModelError: There are several poles, or a number of the model makes no sense in the
+            equations.
     """
-    model, slider, hinge = cartpole.model, cartpole.slider, cartpole.hinge
-    pole, axes = pole_of(model, hinge), axes_of(cartpole)
+    if cartpole.poles > 1:
+        raise ModelError(f"{cartpole.name} has {several_poles(cartpole)}")
+    model, slider, hinge = cartpole.model, cartpole.slider, cartpole.hinges[0]
+    pole, axes = pole_of(cartpole), axes_of(cartpole)
     if pole.mass <= 0:
         name = joint_label(model, hinge)
         raise NotACartPoleError(f"{cartpole.name}: the pole, {name}, has no mass")
     gear = float(model.actuator_gear[0, 0])
     try:
         return Parameters(
-            cart_mass=_mass(model, _cart_bodies(cartpole)),
+            cart_mass=mass_of(model, cart_bodies(cartpole)),
             pole_mass=pole.mass,
             com_distance=float(axes.pole_frame[2] @ pole.com),
             inertia=pole.inertia,
@@ -60,6 +64,11 @@ def read_parameters(cartpole: CartPole) -> Parameters:
         )
     except ValueError as error:
         raise ModelError(f"{cartpole.name} is beyond the equations: {error}") from error
+
+
+def several_poles(cartpole: CartPole) -> str:
+    """Why the equations do not cover a model with several poles."""
+    return f"{cartpole.poles} poles, and the equations are those of one"
 
 
 def differences(p: Parameters, q: Parameters, rtol: float = 1e-12) -> list[str]:
@@ -100,7 +109,7 @@ def _digits(value: float, other: float) -> str:
 
 @dataclass(frozen=True)
 class _Pole:
-    """All bodies below the hinge as one; the frame is that of the hinge's body."""
+    """All bodies of a pole as one; the frame is that of the hinge's body."""
 
     mass: float  # kg
     com: Vector  # from the hinge, m, shape (3,)
@@ -116,26 +125,30 @@ class _Axes:
     pole_frame: Vector  # orientation of the hinge's body, shape (3, 3)
 
 
-def axes_of(cartpole: CartPole) -> _Axes:
-    """Where the joints point when both coordinates are 0."""
+def axes_of(cartpole: CartPole, pole: int = 0) -> _Axes:
+    """Where the cart's joint and a pole's point when all coordinates are 0."""
     model = cartpole.model
     data = mujoco.MjData(model)
     data.qpos[:] = 0.0  # angle 0, which a joint's `ref` can move away from the file's own pose
     mujoco.mj_kinematics(model, data)
-    frame = data.xmat[model.jnt_bodyid[cartpole.hinge]].reshape(3, 3)
-    slider, hinge = data.xaxis[cartpole.slider], data.xaxis[cartpole.hinge]
+    joint = cartpole.hinges[pole]
+    frame = data.xmat[model.jnt_bodyid[joint]].reshape(3, 3)
+    slider, hinge = data.xaxis[cartpole.slider], data.xaxis[joint]
     return _Axes(slider.copy(), hinge.copy(), frame.copy())
 
 
-def pole_of(model: mujoco.MjModel, hinge: int) -> _Pole:
-    """The pole as one rigid body, by the parallel axis theorem.
+def pole_of(cartpole: CartPole, pole: int = 0) -> _Pole:
+    """A pole as one rigid body, by the parallel axis theorem.
 
     Positions are composed in the frame of the hinge's body, not taken from the world: there a
     pole on a table 1.3 m high has lost the last digit of its length.
     """
+    model, hinge = cartpole.model, cartpole.hinges[pole]
     root, axis = int(model.jnt_bodyid[hinge]), model.jnt_axis[hinge]
-    bodies = _subtree(model, root)
-    mass = _mass(model, bodies)
+    bodies = pole_bodies(cartpole, pole)
+    if not bodies:
+        return _Pole(0.0, np.zeros(3), 0.0)
+    mass = mass_of(model, bodies)
     frames = {root: (np.zeros(3), np.eye(3))}
     places, moments = [], []
     for body in bodies:
@@ -155,30 +168,6 @@ def pole_of(model: mujoco.MjModel, hinge: int) -> _Pole:
         arm = np.cross(axis, place - com)
         inertia += float(model.body_mass[body] * (arm @ arm))
     return _Pole(mass, com - model.jnt_pos[hinge], inertia)
-
-
-def _subtree(model: mujoco.MjModel, root: int) -> list[int]:
-    """A body and all below it; parents come before their children."""
-    inside = [root]
-    for body in range(root + 1, model.nbody):
-        if int(model.body_parentid[body]) in inside:
-            inside.append(body)
-    return inside
-
-
-def moving_bodies(cartpole: CartPole) -> list[int]:
-    """Every body that slides, the pole's included."""
-    return _subtree(cartpole.model, int(cartpole.model.jnt_bodyid[cartpole.slider]))
-
-
-def _cart_bodies(cartpole: CartPole) -> list[int]:
-    model = cartpole.model
-    pole = _subtree(model, int(model.jnt_bodyid[cartpole.hinge]))
-    return [body for body in moving_bodies(cartpole) if body not in pole]
-
-
-def _mass(model: mujoco.MjModel, bodies: list[int]) -> float:
-    return float(sum(float(model.body_mass[body]) for body in bodies))
 
 
 def _rotation(quaternion: Vector) -> Vector:

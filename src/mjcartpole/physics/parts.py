@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import mujoco
 
-from mjcartpole.errors import ConfigError
+from mjcartpole.errors import ConfigError, ModelSyntaxError
 from mjcartpole.physics.addresses import label_of
 from mjcartpole.physics.document import Document, Element
 
@@ -89,6 +89,18 @@ class Parts:
         said = [each.attributes.get("inertiafromgeom", "") for each in compilers]
         from_geoms = [each for each in said if each][-1:] == ["true"]
         return found[0] if found and not from_geoms else None
+
+    def spec(self) -> mujoco.MjSpec:
+        """The document with what defaults and classes give to each element.
+
+        Raises:
+            ModelSyntaxError: An edit has left a number that MuJoCo does not read.
+        """
+        try:
+            return mujoco.MjSpec.from_string(self.document.text)
+        except ValueError as error:
+            reason = " ".join(str(error).split())
+            raise ModelSyntaxError(f"the edited document is not a valid MJCF: {reason}") from error
 
     def put(self, element: Element, name: str, values: Sequence[float]) -> None:
         """Write numbers into an attribute; those that do not change keep their spelling.

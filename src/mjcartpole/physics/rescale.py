@@ -14,9 +14,10 @@ import numpy as np
 import numpy.typing as npt
 
 from mjcartpole.errors import ConfigError
+from mjcartpole.physics.bodies import cart_bodies, mass_of, pole_bodies
 from mjcartpole.physics.document import Element
 from mjcartpole.physics.model import CartPole
-from mjcartpole.physics.parameters import moving_bodies, pole_of
+from mjcartpole.physics.parameters import pole_of
 from mjcartpole.physics.parts import Parts, numbers_of
 
 Vector = npt.NDArray[np.float64]
@@ -31,17 +32,6 @@ _LONG: Final = (mujoco.mjtGeom.mjGEOM_CAPSULE, mujoco.mjtGeom.mjGEOM_CYLINDER)
 # --- mass ---------------------------------------------------------------------------------------
 
 
-def cart_bodies(cartpole: CartPole) -> list[int]:
-    """Every body that slides and does not turn."""
-    pole = _pole_bodies(cartpole)
-    return [body for body in moving_bodies(cartpole) if body not in pole]
-
-
-def cart_mass(cartpole: CartPole) -> float:
-    """Mass of all that slides and does not turn, kg."""
-    return float(sum(float(cartpole.model.body_mass[body]) for body in cart_bodies(cartpole)))
-
-
 def set_cart_mass(parts: Parts, cartpole: CartPole, mass: float) -> None:
     """Give the cart another mass; the inertia of what only slides has no effect and stays.
 
@@ -51,16 +41,16 @@ def set_cart_mass(parts: Parts, cartpole: CartPole, mass: float) -> None:
     _set_mass(parts, cartpole.model, cart_bodies(cartpole), "cart", mass)
 
 
-def set_pole_mass(parts: Parts, cartpole: CartPole, mass: float) -> None:
-    """Give the pole another mass, with the inertia that follows.
+def set_pole_mass(parts: Parts, cartpole: CartPole, mass: float, pole: int = 0) -> None:
+    """Give a pole another mass, with the inertia that follows.
 
     Raises:
         ConfigError: There is nothing to scale.
     """
-    model, bodies = cartpole.model, _pole_bodies(cartpole)
-    rod = _RodInertial.of(parts, cartpole)
+    model, bodies = cartpole.model, pole_bodies(cartpole, pole)
+    rod = _RodInertial.of(parts, cartpole, pole)
     alone = len([body for body in bodies if model.body_mass[body] > 0]) == 1
-    ratio = _ratio(mass, pole_of(model, cartpole.hinge).mass)
+    ratio = _ratio(mass, mass_of(model, bodies))
     for body in bodies:
         inertial = parts.inertial(model, body)
         if inertial is None or (rod is not None and body == bodies[0]):
@@ -99,7 +89,7 @@ def _set_mass(
 def _scale_geoms(parts: Parts, model: mujoco.MjModel, body: int, ratio: float) -> None:
     if ratio == 1:
         return
-    spec = mujoco.MjSpec.from_string(parts.document.text)
+    spec = parts.spec()
     effective = [geom for each in spec.bodies for geom in each.geoms]
     for index, element in parts.geoms(model, body):
         geom = effective[index]
@@ -128,14 +118,14 @@ class _RodInertial:
         self._foot, self._side = foot, math.copysign(1.0, com[axis])
 
     @classmethod
-    def of(cls, parts: Parts, cartpole: CartPole) -> "_RodInertial | None":
-        """The pole's own; None if it has none, or is no such rod."""
-        model = cartpole.model
-        root = int(model.jnt_bodyid[cartpole.hinge])
+    def of(cls, parts: Parts, cartpole: CartPole, pole: int) -> "_RodInertial | None":
+        """A pole's own; None if it has none, or is no such rod."""
+        model, hinge = cartpole.model, cartpole.hinges[pole]
+        root = int(model.jnt_bodyid[hinge])
         element = parts.inertial(model, root)
         if element is None or _TURNED & set(element.attributes):
             return None
-        foot = np.array(model.jnt_pos[cartpole.hinge])
+        foot = np.array(model.jnt_pos[hinge])
         com, mass = np.array(numbers_of(element, "pos")) - foot, float(model.body_mass[root])
         axis = int(np.abs(com).argmax())
         if com[axis] == 0:
@@ -172,10 +162,10 @@ def uniform_rod_inertia(mass: float, length: float) -> float:
         return math.inf
 
 
-def set_length(parts: Parts, cartpole: CartPole, length: float) -> float:
-    """Give the pole another length, hinge to tip: everything on it moves along.
+def set_length(parts: Parts, cartpole: CartPole, length: float, pole: int = 0) -> float:
+    """Give a pole another length, hinge to tip: everything on it moves along.
 
-    Bodies that are fixed to the pole keep their shape and move.
+    Bodies that are fixed to the pole, and poles that stand on it, keep their shape and move.
 
     Returns:
         How many times longer it is than it was.
@@ -183,9 +173,9 @@ def set_length(parts: Parts, cartpole: CartPole, length: float) -> float:
     Raises:
         ConfigError: The pole cannot be stretched; the reason is said.
     """
-    model, hinge = cartpole.model, cartpole.hinge
-    root, com = int(model.jnt_bodyid[hinge]), pole_of(model, hinge).com
-    rod, stretch = _RodInertial.of(parts, cartpole), _Stretch(parts, model, hinge, com, root)
+    model, hinge = cartpole.model, cartpole.hinges[pole]
+    root, com = int(model.jnt_bodyid[hinge]), pole_of(cartpole, pole).com
+    rod, stretch = _RodInertial.of(parts, cartpole, pole), _Stretch(parts, model, hinge, com, root)
     stretch.old = rod.length if rod else stretch.reach()
     stretch.new = length
     inertial = parts.inertial(model, root)
@@ -221,7 +211,7 @@ class _Stretch:
         axis = int(np.abs(along).argmax())
         self.axis = axis if abs(along[axis]) > 1 - 1e-15 else None
         self.along = np.eye(3)[axis] * np.sign(along[axis]) if self.axis is not None else along
-        spec = mujoco.MjSpec.from_string(parts.document.text)
+        spec = parts.spec()
         self._effective = [geom for body in spec.bodies for geom in body.geoms]
         self.old = self.new = 1.0
 
@@ -323,12 +313,3 @@ class _Stretch:
     def _spec(self, index: int) -> mujoco.MjsGeom:
         """A geom as the document has it, defaults included."""
         return self._effective[index]
-
-
-def _pole_bodies(cartpole: CartPole) -> list[int]:
-    model = cartpole.model
-    inside = [int(model.jnt_bodyid[cartpole.hinge])]
-    for body in moving_bodies(cartpole):
-        if int(model.body_parentid[body]) in inside and body not in inside:
-            inside.append(body)
-    return inside

@@ -1,18 +1,19 @@
 """State in, control in, state out: a cart-pole moved by MuJoCo, one control step at a time."""
 
 import copy
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import mujoco
 import numpy as np
 import numpy.typing as npt
 
+from mjcartpole import task
 from mjcartpole.errors import ConfigError, SimulationError
 from mjcartpole.integrator import Integrator, check_integrator
 from mjcartpole.physics.model import CartPole
 
-State = tuple[float, float, float, float]
-"""`(x, x_dot, theta, theta_dot)`: m, m/s, rad, rad/s."""
+State = tuple[float, ...]
+"""`(x, x_dot, theta, theta_dot)`: m, m/s, rad, rad/s; two more values for each further pole."""
 
 LARGEST_SANE: float = mujoco.mjMAXVAL
 """MuJoCo calls a coordinate beyond this bad (1e10)."""
@@ -32,8 +33,9 @@ class Simulation:
         cartpole: What is simulated.
         model: The cart-pole's model as it is stepped (see `stepping_model`).
         data: MuJoCo's data; its qpos and qvel are the state.
-        step: `step(control)` advances 0.02 s and returns the new state as four floats. It is a
-            closure over the arrays, since looking them up costs as much as the physics.
+        step: `step(control)` advances one control step and returns the new state as floats. It is
+            a closure over the arrays, since looking them up costs as much as the physics.
+        size: How many values a state has.
     """
 
     def __init__(self, cartpole: CartPole, integrator: Integrator = "gym") -> None:
@@ -47,41 +49,41 @@ class Simulation:
         self.integrator = integrator
         self.model = stepping_model(cartpole.model, integrator)
         self.data = mujoco.MjData(self.model)
+        self.size = 2 * len(cartpole.joints)
         self._qpos, self._qvel = _floats(self.data.qpos), _floats(self.data.qvel)
+        self._places = tuple(zip(range(0, self.size, 2), cartpole.joints, strict=True))
         self._timer = self.data.timer[int(mujoco.mjtTimer.mjTIMER_STEP)]
         make_step = _explicit_euler if integrator == "gym" else _own_integrator
         self.step: Callable[[float], State] = make_step(self.model, self.data, cartpole)
 
     @property
     def state(self) -> npt.NDArray[np.float64]:
-        """The state `(x, x_dot, theta, theta_dot)`, shape (4,), a copy."""
-        qpos, qvel = self.data.qpos, self.data.qvel
-        slider, hinge = self.cartpole.slider, self.cartpole.hinge
-        return np.array([qpos[slider], qvel[slider], qpos[hinge], qvel[hinge]])
+        """The state `(x, x_dot, theta, theta_dot, …)`, shape (size,), a copy."""
+        return np.array(_state_of(self._qpos, self._qvel, self.cartpole.joints))
 
     @state.setter
     def state(self, state: npt.ArrayLike) -> None:
-        """Put the cart-pole into a state, shape (4,); nothing of its past remains.
+        """Put the cart-pole into a state, shape (size,); nothing of its past remains.
 
         Raises:
-            ConfigError: The state has not four values.
+            ConfigError: The state has another shape.
         """
         values = np.asarray(state, dtype=np.float64)
-        if values.shape != (4,):
+        if values.shape != (self.size,):
+            names = ", ".join(task.state_names(self.cartpole.poles))
             raise ConfigError(
-                f"a state has 4 values (x, x_dot, theta, theta_dot), not the shape {values.shape}"
+                f"a state has {self.size} values ({names}), not the shape {values.shape}"
             )
-        self.put(*values.tolist())
+        self.put(values.tolist())
 
-    def put(self, x: float, x_dot: float, theta: float, theta_dot: float) -> None:
+    def put(self, state: Sequence[float]) -> None:
         """Put the cart-pole into a state given as plain floats, as the `state` setter does."""
         # Where steps were timed, mj_resetData words a report of the timers, as slowly as two
         # steps, for a log that is off. It clears the timers in any case.
         self._timer.number = 0
         mujoco.mj_resetData(self.model, self.data)
-        slider, hinge = self.cartpole.slider, self.cartpole.hinge
-        self._qpos[slider], self._qvel[slider] = x, x_dot
-        self._qpos[hinge], self._qvel[hinge] = theta, theta_dot
+        for place, joint in self._places:
+            self._qpos[joint], self._qvel[joint] = state[place], state[place + 1]
 
     def steps(
         self, states: npt.NDArray[np.float64], controls: npt.NDArray[np.float64]
@@ -89,11 +91,11 @@ class Simulation:
         """One control step from each of many states.
 
         Args:
-            states: Shape (n, 4).
+            states: Shape (n, size).
             controls: Shape (n,).
 
         Returns:
-            The states afterwards, shape (n, 4).
+            The states afterwards, shape (n, size).
         """
         after = np.empty_like(states)
         for index, (state, control) in enumerate(zip(states, controls.tolist(), strict=True)):
@@ -107,15 +109,15 @@ class Simulation:
         """MuJoCo's accelerations in each of many states.
 
         Args:
-            states: Shape (n, 4).
+            states: Shape (n, size).
             controls: Shape (n,).
 
         Returns:
-            `(x_acc, theta_acc)`, shape (n, 2): m/s^2, rad/s^2.
+            `(x_acc, theta_acc, …)`, shape (n, size / 2): m/s^2, rad/s^2.
         """
         model, data = self.model, self.data
-        where = [self.cartpole.slider, self.cartpole.hinge]
-        found = np.empty((len(states), 2))
+        where = list(self.cartpole.joints)
+        found = np.empty((len(states), len(where)))
         for index, (state, control) in enumerate(zip(states, controls.tolist(), strict=True)):
             self.state = state
             data.ctrl[0] = control
@@ -173,7 +175,8 @@ def _explicit_euler(
     model: mujoco.MjModel, data: mujoco.MjData, cartpole: CartPole
 ) -> Callable[[float], State]:
     qpos, qvel, ctrl = _floats(data.qpos), _floats(data.qvel), _floats(data.ctrl)
-    slider, hinge, substeps = cartpole.slider, cartpole.hinge, cartpole.substeps
+    slider, hinge, substeps = cartpole.slider, cartpole.hinges[0], cartpole.substeps
+    joints = cartpole.joints
     h = float(model.opt.timestep)
     mj_step = mujoco.mj_step
 
@@ -189,19 +192,34 @@ def _explicit_euler(
         qpos[hinge] = theta
         return x, qvel[slider], theta, qvel[hinge]
 
+    def step_poles(control: float) -> State:
+        ctrl[0] = control
+        positions = [qpos[joint] + h * qvel[joint] for joint in joints]
+        try:
+            mj_step(model, data)
+        except mujoco.FatalError as error:
+            raise _gave_up(cartpole, error) from error
+        for joint, position in zip(joints, positions, strict=True):
+            qpos[joint] = position
+        return _state_of(qpos, qvel, joints)
+
+    # One pole is the usual case; written out, it takes half the time.
+    step_once = step if cartpole.poles == 1 else step_poles
+
     def several_steps(control: float) -> State:
         for _ in range(substeps - 1):
-            step(control)
-        return step(control)
+            step_once(control)
+        return step_once(control)
 
-    return step if substeps == 1 else several_steps
+    return step_once if substeps == 1 else several_steps
 
 
 def _own_integrator(
     model: mujoco.MjModel, data: mujoco.MjData, cartpole: CartPole
 ) -> Callable[[float], State]:
     qpos, qvel, ctrl = _floats(data.qpos), _floats(data.qvel), _floats(data.ctrl)
-    slider, hinge, substeps = cartpole.slider, cartpole.hinge, cartpole.substeps
+    slider, hinge, substeps = cartpole.slider, cartpole.hinges[0], cartpole.substeps
+    joints, is_one = cartpole.joints, cartpole.poles == 1
     mj_step = mujoco.mj_step
 
     def step(control: float) -> State:
@@ -210,9 +228,17 @@ def _own_integrator(
             mj_step(model, data, substeps)
         except mujoco.FatalError as error:
             raise _gave_up(cartpole, error) from error
-        return qpos[slider], qvel[slider], qpos[hinge], qvel[hinge]
+        if is_one:
+            return qpos[slider], qvel[slider], qpos[hinge], qvel[hinge]
+        return _state_of(qpos, qvel, joints)
 
     return step
+
+
+def _state_of(
+    qpos: "memoryview[float]", qvel: "memoryview[float]", joints: tuple[int, ...]
+) -> State:
+    return tuple([value for joint in joints for value in (qpos[joint], qvel[joint])])
 
 
 def _gave_up(cartpole: CartPole, error: mujoco.FatalError) -> SimulationError:
@@ -235,13 +261,9 @@ def check_sane(state: State, model_name: str) -> None:
     Raises:
         SimulationError: A value is NaN, infinite or beyond `LARGEST_SANE`.
     """
-    x, x_dot, theta, theta_dot = state
-    low, high = -LARGEST_SANE, LARGEST_SANE
-    # Written out, since every step past an episode's end comes here.
-    if not (
-        low < x < high and low < x_dot < high and low < theta < high and low < theta_dot < high
-    ):
+    if not all(-LARGEST_SANE < value < LARGEST_SANE for value in state):
+        names = ", ".join(task.state_names(len(state) // 2 - 1))
         raise SimulationError(
-            f"the simulation of {model_name} diverged: (x, x_dot, theta, theta_dot) = {state}; "
+            f"the simulation of {model_name} diverged: ({names}) = {state}; "
             "look for tiny masses, huge forces or a long timestep in the model"
         )

@@ -2,20 +2,28 @@
 
 import functools
 import itertools
-from typing import Any, Final
+from typing import Any, Final, Protocol
 
 import mujoco
 import numpy as np
 
 from mjcartpole import task
 from mjcartpole.errors import ModelError
-from mjcartpole.physics.structure import HasParts
+from mjcartpole.physics.bodies import HasJoints
 
 MOST_MEMORY: Final = 2**30
 """Bytes that a model may ask for, for contacts and constraints."""
 
 MOST_ITERATIONS: Final = 10_000
 """Of a solver, per step."""
+
+
+class HasParts(HasJoints, Protocol):
+    """A compiled model whose joints and controls have been found."""
+
+    @property
+    def controls(self) -> tuple[float, float]:
+        """The actuator's control for action 0 and for action 1."""
 
 
 def check_numbers(name: str, model: mujoco.MjModel) -> None:

@@ -1,12 +1,13 @@
 """What makes a compiled model a cart-pole, or the reason why it is none.
 
 Names do not matter. Needed are a slide joint (the cart's), a hinge joint inside its body (the
-pole's), and a motor on the slide joint that can push in two ways; the push must tilt the pole.
+pole's), and a motor on the slide joint that can push in two ways; the push must tilt the pole. Each
+further hinge is one more pole, beside the first or on it.
 """
 
 import math
 from dataclasses import dataclass
-from typing import Final, Protocol
+from typing import Final
 
 import mujoco
 import numpy as np
@@ -14,6 +15,7 @@ import numpy.typing as npt
 
 from mjcartpole import task
 from mjcartpole.errors import NotACartPoleError
+from mjcartpole.physics.bodies import HasJoints, mass_of, pole_bodies
 
 Vector = npt.NDArray[np.float64]
 
@@ -26,6 +28,9 @@ LEAST_COUPLING: Final = 0.5
 LEAST_ARM: Final = 1e-6
 """Metres; where the pole's centre of mass is nearer to the hinge, no angle is upright."""
 
+LEAST_INERTIA: Final = 1e-9
+"""Of any motion of several poles, relative; below it joints cannot be told apart."""
+
 _KIND: Final = {
     mujoco.mjtJoint.mjJNT_SLIDE: "slide",
     mujoco.mjtJoint.mjJNT_HINGE: "hinge",
@@ -37,29 +42,9 @@ _KIND: Final = {
 _SHOWN: Final = 6
 
 
-class HasParts(Protocol):
-    """A compiled model whose parts have been found."""
-
-    @property
-    def model(self) -> mujoco.MjModel:
-        """The compiled model."""
-
-    @property
-    def slider(self) -> int:
-        """Index of the cart's joint."""
-
-    @property
-    def hinge(self) -> int:
-        """Index of the pole's joint."""
-
-    @property
-    def controls(self) -> tuple[float, float]:
-        """The actuator's control for action 0 and for action 1."""
-
-
 @dataclass(frozen=True)
 class Directions:
-    """Where the parts of a cart-pole point when both coordinates are 0.
+    """Where the cart and one pole point when all coordinates are 0.
 
     Attributes:
         up: The world axis that gravity points away from most (z where there is none), shape (3,).
@@ -83,11 +68,11 @@ class Directions:
         return float(self.lean @ self.rail)
 
 
-def find_joints(name: str, model: mujoco.MjModel) -> tuple[int, int]:
-    """Indices of the cart's and the pole's joint.
+def find_joints(name: str, model: mujoco.MjModel) -> tuple[int, tuple[int, ...]]:
+    """Index of the cart's joint, and of each pole's; all have one coordinate each.
 
     Raises:
-        NotACartPoleError: There are not exactly these two, or the hinge is not inside the cart.
+        NotACartPoleError: There is another joint, or a hinge is not inside the cart.
     """
     kinds = [mujoco.mjtJoint(int(kind)) for kind in model.jnt_type]
     for kind in (mujoco.mjtJoint.mjJNT_FREE, mujoco.mjtJoint.mjJNT_BALL):
@@ -95,22 +80,20 @@ def find_joints(name: str, model: mujoco.MjModel) -> tuple[int, int]:
             raise refusal(
                 name, model, f"a {_KIND[kind]} joint, that is neither the cart's nor the pole's"
             )
-    slider = _only(name, model, mujoco.mjtJoint.mjJNT_SLIDE, "the cart's")
-    hinge = _only(name, model, mujoco.mjtJoint.mjJNT_HINGE, "the pole's")
-    if not _is_below(model, model.jnt_bodyid[hinge], model.jnt_bodyid[slider]):
-        raise refusal(name, model, "a hinge whose body is not inside the cart's body")
-    return slider, hinge
-
-
-def _only(name: str, model: mujoco.MjModel, kind: mujoco.mjtJoint, whose: str) -> int:
-    """Index of the only joint of a kind; slide and hinge joints have one coordinate each."""
-    word = _KIND[kind]
-    found = [index for index in range(model.njnt) if model.jnt_type[index] == kind]
-    if len(found) == 1:
-        return found[0]
-    amount = f"{len(found)} {word} joints" if found else f"no {word} joint"
-    several = "; several poles are not supported yet" if len(found) > 1 and word == "hinge" else ""
-    raise refusal(name, model, f"{amount} where one ({whose}) is needed{several}")
+    sliders, hinges = (
+        [index for index, found in enumerate(kinds) if found == kind]
+        for kind in (mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_HINGE)
+    )
+    if len(sliders) != 1:
+        amount = f"{len(sliders)} slide joints" if sliders else "no slide joint"
+        raise refusal(name, model, f"{amount} where one (the cart's) is needed")
+    if not hinges:
+        raise refusal(name, model, "no hinge joint where one (the pole's) is needed")
+    for hinge in hinges:
+        if not _is_below(model, model.jnt_bodyid[hinge], model.jnt_bodyid[sliders[0]]):
+            which = f" ('{model.joint(hinge).name or hinge}')" if len(hinges) > 1 else ""
+            raise refusal(name, model, f"a hinge{which} whose body is not inside the cart's body")
+    return sliders[0], tuple(hinges)
 
 
 def _is_below(model: mujoco.MjModel, body: int, ancestor: int) -> bool:
@@ -213,15 +196,14 @@ def find_substeps(name: str, model: mujoco.MjModel) -> int:
     return substeps
 
 
-def directions(parts: HasParts) -> Directions:
-    """Where the parts of a cart-pole point when both coordinates are 0."""
-    model, slider, hinge = parts.model, parts.slider, parts.hinge
+def directions(parts: HasJoints, pole: int = 0) -> Directions:
+    """Where the cart and one pole point when all coordinates are 0."""
+    model, slider, hinge = parts.model, parts.slider, parts.hinges[pole]
     data = mujoco.MjData(model)
     data.qpos[:] = 0.0
     mujoco.mj_kinematics(model, data)
-    mujoco.mj_comPos(model, data)
     axis = data.xaxis[hinge]
-    arm = data.subtree_com[model.jnt_bodyid[hinge]] - data.xanchor[hinge]
+    arm = _centre(parts, pole, data) - data.xanchor[hinge]
     arm = arm - (arm @ axis) * axis
     up = _up(model.opt.gravity)
     lean = np.cross(axis, up)
@@ -230,6 +212,19 @@ def directions(parts: HasParts) -> Directions:
         # From where the arm points to where `up` does, about the axis.
         angle = math.atan2(float(axis @ np.cross(arm, up)), float(arm @ up))
     return Directions(up, data.xaxis[slider].copy(), lean, arm, angle)
+
+
+def _centre(parts: HasJoints, pole: int, data: mujoco.MjData) -> Vector:
+    """A pole's centre of mass in the world, m, shape (3,)."""
+    model, bodies = parts.model, pole_bodies(parts, pole)
+    if mass_of(model, bodies) > 0:
+        weights = model.body_mass[bodies]
+        centre: Vector = weights @ data.xipos[bodies] / weights.sum()
+        return centre
+    # Nothing weighs but what stands on it, or nothing at all.
+    mujoco.mj_comPos(model, data)
+    whole: Vector = data.subtree_com[model.jnt_bodyid[parts.hinges[pole]]]
+    return whole
 
 
 def _up(gravity: Vector) -> Vector:
@@ -241,27 +236,52 @@ def _up(gravity: Vector) -> Vector:
     return up
 
 
-def check_directions(name: str, parts: HasParts) -> Directions:
-    """Refuse a pole that no push along the rail tilts.
+def check_directions(name: str, parts: HasJoints, pole: int = 0) -> Directions:
+    """Refuse a pole that no push along the rail tilts, and a wheel among several poles.
 
     Raises:
         NotACartPoleError: As said; the reason is named.
     """
-    found = directions(parts)
+    found, which = directions(parts, pole), _which(parts, pole)
     if abs(found.rail @ found.up) > 1 - LEAST_COUPLING**2:
-        raise refusal(name, parts.model, "a slide joint that goes up and down, not along a rail")
-    if np.linalg.norm(found.lean) < LEAST_COUPLING:
-        raise refusal(name, parts.model, "a hinge that turns about the vertical")
-    if abs(found.coupling) < LEAST_COUPLING:
-        raise refusal(
-            name,
-            parts.model,
-            "a hinge whose axis is along the rail, so a push does not tilt the pole",
-        )
-    return found
+        reason = "a slide joint that goes up and down, not along a rail"
+    elif np.linalg.norm(found.lean) < LEAST_COUPLING:
+        reason = f"a hinge{which} that turns about the vertical"
+    elif abs(found.coupling) < LEAST_COUPLING:
+        reason = f"a hinge{which} whose axis is along the rail, so a push does not tilt the pole"
+    elif len(parts.hinges) > 1 and np.linalg.norm(found.arm) < LEAST_ARM:
+        reason = f"a hinge{which} that turns about its own centre of mass, as a wheel and no pole"
+    else:
+        return found
+    raise refusal(name, parts.model, reason)
 
 
-def count_from_upright(name: str, parts: HasParts, upright: float) -> float:
+def _which(parts: HasJoints, pole: int) -> str:
+    """A hinge's name in brackets where there are several."""
+    if len(parts.hinges) == 1:
+        return ""
+    return f" ('{parts.model.joint(parts.hinges[pole]).name or f'number {pole + 1}'}')"
+
+
+def check_independent(name: str, parts: HasJoints) -> None:
+    """Refuse several hinges of which one adds no motion of its own.
+
+    Raises:
+        NotACartPoleError: The inertia of all joints together is singular.
+    """
+    model = parts.model
+    if len(parts.hinges) == 1:
+        return
+    data, inertia = mujoco.MjData(model), np.empty((model.nv, model.nv))
+    data.qpos[:] = 0.0
+    mujoco.mj_fwdPosition(model, data)
+    mujoco.mj_fullM(model, data, inertia)
+    scale = np.sqrt(np.maximum(inertia.diagonal(), mujoco.mjMINVAL))
+    if np.linalg.eigvalsh(inertia / np.outer(scale, scale))[0] < LEAST_INERTIA:
+        raise refusal(name, model, "hinges that turn alike, or poles without mass")
+
+
+def count_from_upright(name: str, parts: HasJoints, pole: int, upright: float) -> float:
     """Change, in place, from where a compiled model counts the hinge's angle.
 
     It is what the attribute `ref` does in a document: the pose stays, its coordinate moves. No
@@ -270,6 +290,7 @@ def count_from_upright(name: str, parts: HasParts, upright: float) -> float:
     Args:
         name: What a person calls the model.
         parts: The model and its joints.
+        pole: Which pole.
         upright: The angle that becomes 0, rad; of those a full turn apart, one inside the limits.
 
     Returns:
@@ -278,7 +299,7 @@ def count_from_upright(name: str, parts: HasParts, upright: float) -> float:
     Raises:
         NotACartPoleError: Something else in the model counts by the old angle.
     """
-    model, hinge = parts.model, parts.hinge
+    model, hinge = parts.model, parts.hinges[pole]
     upright = _within_limits(model, hinge, upright)
     if model.ntendon or model.nplugin:
         raise refusal(
@@ -302,14 +323,15 @@ def _within_limits(model: mujoco.MjModel, hinge: int, angle: float) -> float:
     return angle
 
 
-def check_limits(name: str, parts: HasParts) -> None:
+def check_limits(name: str, parts: HasJoints) -> None:
     """Refuse joints whose limits keep them from position 0, where episodes start.
 
     Raises:
         NotACartPoleError: As said.
     """
     model = parts.model
-    for joint, place in ((parts.slider, "x = 0"), (parts.hinge, "the upright position")):
+    for joint in (parts.slider, *parts.hinges):
+        place = "x = 0" if joint == parts.slider else "the upright position"
         low, high = model.jnt_range[joint]
         if model.jnt_limited[joint] and not low <= 0.0 <= high:
             label = model.joint(joint).name or f"number {joint}"
@@ -332,6 +354,6 @@ def refusal(name: str, model: mujoco.MjModel, found: str) -> NotACartPoleError:
     return NotACartPoleError(
         f"{name} is not a cart-pole: it has {found} "
         f"[joints: {', '.join(joints) or 'none'}; actuators: {', '.join(actuators) or 'none'}]; "
-        "needed are a slide joint for the cart, one hinge joint inside it, and one motor on the "
-        "slide joint"
+        "needed are a slide joint for the cart, a hinge joint inside it for each pole, and one "
+        "motor on the slide joint"
     )

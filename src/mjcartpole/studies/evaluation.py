@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 from gymnasium.utils import seeding
 
-from mjcartpole.envs.backend import Backend, check_backend, make_env
+from mjcartpole.envs.backend import GYM_ID, Backend, check_backend, make_env
 from mjcartpole.errors import ConfigError
 from mjcartpole.integrator import Integrator
 from mjcartpole.learning.engine import Engine, choose_engine
@@ -97,9 +97,11 @@ def evaluate(
         from mjcartpole.physics.model import load_model  # noqa: PLC0415 - it imports MuJoCo
 
         model = load_model(model)
-        engine = choose_engine(engine, backend, model)
+        engine, poles, name = choose_engine(engine, backend, model), model.poles, model.name
     else:
-        engine = choose_engine(engine, backend)
+        engine, poles, name = choose_engine(engine, backend), 1, GYM_ID
+    if isinstance(policy, Policy):
+        policy.check_fits(poles, name)
     if engine == "compiled" and isinstance(policy, Policy):
         from mjcartpole.learning.compiled import CompiledLoop  # noqa: PLC0415 - it is heavy
 

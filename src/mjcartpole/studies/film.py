@@ -1,6 +1,7 @@
 """Greedy episodes as pictures: played first, then drawn frame by frame."""
 
 import contextlib
+import functools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final
@@ -68,7 +69,7 @@ class Stage:
     integrator: Integrator = "gym"
     seed: int = SEED
 
-    @property
+    @functools.cached_property
     def cartpole(self) -> CartPole:
         """What is drawn."""
         return load_model(self.model)
@@ -115,12 +116,22 @@ class Look:
                 "0.25 is four times slower, 1 as it was"
             )
 
-    def places(self, states: int) -> npt.NDArray[np.float64]:
-        """Where in an episode of so many states each frame lies, in control steps."""
-        # Played as it was, a film has a frame per control step at 50 frames per second.
-        steps_per_frame = self.speed / (CONTROL_STEP * self.fps)
+    def places(self, states: int, control_step: float = CONTROL_STEP) -> npt.NDArray[np.float64]:
+        """Where in an episode each frame lies, in control steps.
+
+        Args:
+            states: How many the episode has.
+            control_step: Seconds from one to the next.
+        """
+        # Played as it was, a film has a frame per control step of 0.02 s at 50 frames per second.
+        steps_per_frame = self.speed / (control_step * self.fps)
         if self.fall:
-            return last_seconds(states, seconds=FALL_SECONDS, speed=FALL_SPEED * steps_per_frame)
+            return last_seconds(
+                states,
+                seconds=FALL_SECONDS,
+                speed=FALL_SPEED * steps_per_frame,
+                steps_per_second=1 / control_step,
+            )
         return played(states, speed=steps_per_frame)
 
 
@@ -131,12 +142,16 @@ class Take:
     Attributes:
         stage: Who played, and where.
         episode: What it came to.
-        states: From the first to the last, shape (steps + 1, 4).
+        states: From the first to the last, one row each, shape (steps + 1, 4) with one pole.
     """
 
     stage: Stage
     episode: Episode
     states: npt.NDArray[np.float64]
+
+    def places(self, look: Look) -> npt.NDArray[np.float64]:
+        """Where in the episode each frame of a film lies, in control steps."""
+        return look.places(len(self.states), self.stage.cartpole.control_step)
 
     def moment(self, place: float) -> Moment:
         """What an overlay says at a place between control steps."""
@@ -154,10 +169,12 @@ def play(stage: Stage, episodes: int = 1) -> list[Take]:
     """Play the first episodes that an evaluation with the same seed plays.
 
     Raises:
-        ConfigError: There is no episode to be played, or the seed is negative.
+        ConfigError: There is no episode to be played, the seed is negative, or the policy is one
+            for another number of poles.
         SimulationError: The physics diverged.
     """
     check_count(episodes, stage.seed)
+    stage.policy.check_fits(stage.cartpole.poles, stage.cartpole.name)
     takes = []
     with contextlib.closing(make_env(stage.backend, stage.model, stage.integrator)) as env:
         for number in range(episodes):
@@ -195,8 +212,7 @@ class Film:
             ]
             self._open = opened.pop_all()
         self.length = sum(
-            max(len(look.places(len(take.states))) for take in takes)
-            for takes in zip(*casts, strict=True)
+            max(len(take.places(look)) for take in takes) for takes in zip(*casts, strict=True)
         )
         self.drawn_by: str = self._renderers[0].kind
 
@@ -216,13 +232,13 @@ class Film:
     def contact_sheet(self, count: int) -> Frame:
         """Equally spaced moments of the first stage's first episode, as one picture."""
         take, renderer = self._casts[0][0], self._renderers[0]
-        places = self._look.places(len(take.states))
+        places, control_step = take.places(self._look), take.stage.cartpole.control_step
         chosen = [float(places[index]) for index in equally_spaced(len(places), count)]
         frames = [frame.copy() for frame in self._draw_places(take, renderer, chosen)]
-        return sheet(frames, [time_label(place) for place in chosen])
+        return sheet(frames, [time_label(place, control_step) for place in chosen])
 
     def _draw(self, take: Take, renderer: Renderer) -> Iterator[Frame]:
-        return self._draw_places(take, renderer, self._look.places(len(take.states)))
+        return self._draw_places(take, renderer, take.places(self._look))
 
     def _draw_places(
         self, take: Take, renderer: Renderer, places: Sequence[float] | npt.NDArray[np.float64]

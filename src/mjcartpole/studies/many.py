@@ -6,7 +6,6 @@ from pathlib import Path
 from mjcartpole.learning import runs
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.engine import Engine
-from mjcartpole.physics.model import load_model
 from mjcartpole.studies import seed_runs
 from mjcartpole.studies.seeds import Crew, ManyResult, SeedResult
 
@@ -43,7 +42,8 @@ def train_many(
         ModelError: The model cannot be used.
         FileError: The folder is taken or cannot be written.
     """
-    cartpole = load_model(config.model, config.set)
+    cartpole = config.load_model()
+    config.discretizer(cartpole.poles)
     if run_dir is None:
         crew = Crew(config, seeds, cartpole, workers=workers, engine=engine)
         return _finished(crew, crew.run(_never))

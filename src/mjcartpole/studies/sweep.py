@@ -146,6 +146,7 @@ def sweep(
     *,
     edits: Edits = None,
     integrator: Integrator = "gym",
+    own_timestep: bool = False,
     episodes: int = EPISODES,
     seed: int = SEED,
     workers: int | None = None,
@@ -159,6 +160,7 @@ def sweep(
         values: Rising.
         edits: What else is changed, at all values; see `load_model`.
         integrator: See `Simulation`.
+        own_timestep: See `load_model`.
         episodes: Greedy episodes for each policy and value.
         seed: Seeds the starting states and the bootstrap.
         workers: How many at once; as many as there are cores if left out.
@@ -171,8 +173,11 @@ def sweep(
     check_count(episodes, seed)
     others = edits_of(edits or ())
     _check(model, key, values, others)
-    base = load_model(model)
-    places = [find_place(base, {**others, key: value}, integrator) for value in values]
+    base = load_model(model, own_timestep=True)
+    places = [
+        find_place(base, {**others, key: value}, integrator, own_timestep=own_timestep)
+        for value in values
+    ]
     played = transfer(policies, places, episodes=episodes, seed=seed, workers=workers)
     return SweepResult(key, tuple(map(float, values)), base.name, played)
 

@@ -40,6 +40,11 @@ class Place:
         """Who does the physics."""
         return "gym" if self.cartpole is None else "mujoco"
 
+    @property
+    def poles(self) -> int:
+        """How many there are."""
+        return 1 if self.cartpole is None else self.cartpole.poles
+
 
 @dataclass(frozen=True, eq=False)
 class Cell:
@@ -123,13 +128,20 @@ class TransferResult:
         }
 
 
-def find_place(model: ModelLike, edits: Edits = None, integrator: Integrator = "gym") -> Place:
+def find_place(
+    model: ModelLike,
+    edits: Edits = None,
+    integrator: Integrator = "gym",
+    *,
+    own_timestep: bool = False,
+) -> Place:
     """A model as a place, with some things in it changed; `"gym"` is gymnasium's CartPole-v1.
 
     Args:
         model: See `load_model`, or `"gym"`, which no edit changes.
         edits: See `load_model`.
         integrator: See `Simulation`; gymnasium's keeps its own.
+        own_timestep: See `load_model`; gymnasium's keeps its own.
 
     Raises:
         ModelError: The model cannot be used; the message names it.
@@ -137,7 +149,7 @@ def find_place(model: ModelLike, edits: Edits = None, integrator: Integrator = "
     """
     if model == GYM:
         return Place(GYM, None)
-    cartpole = load_model(model, edits)
+    cartpole = load_model(model, edits, own_timestep=own_timestep)
     return Place(cartpole.name, cartpole, integrator)
 
 
@@ -162,7 +174,8 @@ def transfer(
         workers: How many cells at once; as many as there are cores if left out.
 
     Raises:
-        ConfigError: There is no policy or place, or a number makes no sense.
+        ConfigError: There is no policy or place, a number makes no sense, or a policy is one for
+            another number of poles.
         ModelError: A model cannot be used; nothing has been played then.
     """
     check_count(episodes, seed)
@@ -170,6 +183,8 @@ def transfer(
         raise ConfigError("a transfer needs one policy and one model at least")
     found = [place if isinstance(place, Place) else find_place(place) for place in places]
     pairs = [(name, place) for name in policies for place in found]
+    for name, place in pairs:
+        policies[name].check_fits(place.poles, place.name)
     with _pool(workers, len(pairs)) as pool:
         futures = [
             pool.submit(_play, name, policies[name], place, episodes, seed) for name, place in pairs
