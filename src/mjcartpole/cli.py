@@ -301,13 +301,15 @@ def parse(argv: Sequence[str]) -> Command:
 
 def _gather_edits(argv: Sequence[str]) -> list[str]:
     """One --set with all edits, wherever and however often they were given."""
-    words, edits, follows = [], list[str](), False
+    words, edits, follows, first = [], list[str](), False, False
     for word in argv:
         if word == "--set" or word.startswith("--set="):
             edits += [word.removeprefix("--set=")] if "=" in word else []
-            follows = True
-        elif follows and "=" in word and not word.startswith("-"):
+            follows, first = True, "=" not in word
+        elif follows and (first or "=" in word) and not word.startswith("-"):
+            # The first one is meant as an edit, even where it is none.
             edits.append(word)
+            first = False
         else:
             follows = False
             words.append(word)

@@ -50,7 +50,9 @@ def set_stage(source: Path, choice: Choice) -> Stage:
     backend: Backend
     integrator: Integrator
     if source.is_file():
-        name, policy = source.stem, Policy.load(source)
+        # Every run's own is called policy.json: its folder tells them apart.
+        name = source.resolve().parent.name if source.name == runs.POLICY else source.stem
+        policy = Policy.load(source)
         backend, integrator, model, own_timestep = "mujoco", "gym", "cartpole", False
     else:
         run = runs.load_run(source)

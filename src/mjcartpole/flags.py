@@ -161,7 +161,7 @@ class Transfer:
     models: tuple[str, ...] = ()
     """Names or files of models, and gym for gymnasium's own; all there are if left out."""
     set: tuple[str, ...] = ()
-    """Edits of every model, such as pole.length=1.5 or joint:hinge.damping=0.1."""
+    """Edits of every model, such as pole.length=1.5 or joint:hinge.damping=0.1; gym has none."""
     sweep: str | None = None
     """An edit over a range, such as pole.length=0.5:3:0.25, on one model."""
     integrator: Integrator = "gym"

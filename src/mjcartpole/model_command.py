@@ -8,7 +8,7 @@ from mjcartpole.errors import ConfigError
 from mjcartpole.files import write_whole
 from mjcartpole.physics.describe import describe
 from mjcartpole.physics.edit import EDIT_NAMES, describe_edits, differs_from
-from mjcartpole.physics.model import load_model, model_names, models_folder
+from mjcartpole.physics.model import find_model, load_model, model_names, models_folder
 from mjcartpole.physics.simulation import silence_mujoco
 
 _COMMENT = re.compile(r"<!--(.*?)-->", re.DOTALL)
@@ -52,11 +52,17 @@ def run_edit(base: str, edits: Sequence[str], output: Path | None) -> int:
         raise ConfigError("no file to write; give -o FILE.xml")
     # Both before the file is written; of a model with an odd timestep too.
     before, after = (load_model(base, each, own_timestep=True) for each in ((), edits))
-    write_whole(output, after.xml)
+    write_whole(output, _mark_of(base) + after.xml)
     print(f"{output}: {base} with")
     for line in describe_edits(before.xml, after.xml):
         print(f"  {line}")
     return 0
+
+
+def _mark_of(base: str) -> str:
+    """The byte order mark that some editors put before a file; it stays where it was."""
+    mark = "\ufeff"
+    return mark if find_model(base).read_bytes().startswith(mark.encode()) else ""
 
 
 def _headline(path: Path) -> str:

@@ -75,7 +75,8 @@ def _print_result(result: Result) -> None:
 
 
 def _number(value: float) -> str:
-    return f"{value:.0f}" if value == round(value) and abs(value) < 1e7 else f"{value:.4g}"
+    whole = abs(value) < 1e7 and value == round(value)
+    return f"{value:.0f}" if whole else f"{value:.4g}"
 
 
 def _bound(figure: Figure) -> str:

@@ -37,6 +37,8 @@ LEAN: Final = 0.1
 """How far the pole leans in the sketch, rad."""
 EVALUATED: Final = 50
 """Greedy episodes."""
+EVALUATION_PATIENCE: Final = 2.0
+"""Seconds that these may take, if need be with fewer of them."""
 PATIENCE: Final = 6.0
 """Seconds that a training may take at most, if need be with fewer episodes."""
 FPS: Final = 25.0
@@ -44,6 +46,7 @@ FPS: Final = 25.0
 _TRIAL: Final = 0.5
 """Seconds of training after which it is known how long the rest will take."""
 _LEAST_EPISODES: Final = 20
+_LEAST_EVALUATED: Final = 3
 
 
 class _SavedAgainError(Exception):
@@ -212,7 +215,10 @@ def _follow(watched: Watched, recipe: Recipe) -> None:
     _hold_against_itself(cartpole, watched.check)
     result = _train(recipe.config, cartpole, watched.check)
     evaluation = evaluate(
-        result.policy, model=cartpole, integrator=result.config.integrator, episodes=EVALUATED
+        result.policy,
+        model=cartpole,
+        integrator=result.config.integrator,
+        episodes=_count_evaluated(result),
     )
     _say("greedy", _greedy(evaluation))
     watched.check()
@@ -305,10 +311,19 @@ def _affordable(first: TrainResult, now: TrainResult) -> int:
     return min(asked, max(_LEAST_EPISODES, int(PATIENCE / seconds_per_episode)))
 
 
+def _count_evaluated(result: TrainResult) -> int:
+    """How many greedy episodes there is time for, should all of them last to the time limit."""
+    seconds_per_episode = result.seconds / max(result.steps, 1) * TIME_LIMIT
+    return max(_LEAST_EVALUATED, min(EVALUATED, int(EVALUATION_PATIENCE / seconds_per_episode)))
+
+
 def _greedy(evaluation: Evaluation) -> str:
     returns = evaluation.returns
     endings = ", ".join(f"{count} {how}" for how, count in evaluation.endings.items() if count)
-    return f"mean return {returns.mean():.1f}, minimum {returns.min():.0f} ({endings})"
+    return (
+        f"mean return {returns.mean():.1f}, minimum {returns.min():.0f} "
+        f"of {len(returns)} episodes ({endings})"
+    )
 
 
 def _film(stage: Stage, path: Path, check: Callable[[], None], signals: StopSignals) -> None:

@@ -338,6 +338,15 @@ def test_the_length_of_chunks_changes_nothing(chunk, backend, monkeypatch):
     assert ends[-1] == 120
 
 
+def test_a_chunk_is_as_long_as_its_physics_steps_take():
+    """Ctrl-C, progress and whoever watches wait for a chunk."""
+    lengths = []
+    for timestep in (0.02, 0.0002, 0.00002):
+        loop = CompiledLoop("mujoco", load_model("cartpole", {"timestep": timestep}), "gym")
+        lengths.append(loop._chunk)
+    assert lengths == [compiled.CHUNK_STEPS, compiled.CHUNK_STEPS // 100, 50]
+
+
 def test_a_loop_forgets_that_its_physics_diverged():
     """Whoever goes on hears of what is found this time, not of the last time."""
     loop = CompiledLoop("mujoco", load_model(DIVERGING["NaN, later"]), "gym")

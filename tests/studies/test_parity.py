@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import math
 import re
 
 import gymnasium
@@ -14,6 +15,7 @@ from mjcartpole.physics import equations
 from mjcartpole.physics.equations import CARTPOLE_V1, uniform_rod
 from mjcartpole.physics.model import load_model
 from mjcartpole.studies.parity import RUNGS, Figure, Result, Subject, run_ladder
+from mjcartpole.studies.parity.convergence import _order_figures
 from mjcartpole.studies.parity.diagnosis import likely_cause
 from mjcartpole.studies.parity.dynamics import EPS, gym_steps, step_gym
 from mjcartpole.studies.parity.subject import Batch, set_parameters, why_not_gymnasiums
@@ -196,6 +198,44 @@ def test_random_poles_with_damping_move_as_their_equations_do(seed):
     assert subject.gym_cannot
     assert results[7].verdict == "skipped"
     assert any("gymnasium is no witness here" in line for line in results[3].story)
+
+
+FAR_FROM_THE_REFERENCE = [
+    {"gravity": 0.0},
+    {"rail.damping": 50.0, "cart.mass": 0.05},
+    {"pole.mass": 1e-4, "hinge.damping": 0.01},
+    {"pole.length": 0.02, "gravity": 50.0, "hinge.damping": 0.5},
+    {"pole.mass": 1e-4, "gravity": 0.1, "force": 0.5},
+    {"pole.length": 0.02, "pole.mass": 1e-4, "gravity": 0.1, "force": 0.5},
+    {"pole.length": 40.0, "pole.mass": 1e-4, "gravity": 0.1, "force": 0.5, "timestep": 0.001},
+    {"pole.length": 0.02, "pole.mass": 50.0, "cart.mass": 0.02, "force": 200.0},
+    {"hinge.armature": 1.0, "rail.armature": 5.0, "hinge.damping": 1.0, "timestep": 0.005},
+]
+
+
+@pytest.mark.parametrize("edits", FAR_FROM_THE_REFERENCE, ids=",".join)
+def test_extreme_but_right_models_move_as_their_equations_do(edits):
+    cartpole = load_model("cartpole", edits, own_timestep=True)
+    results = list(run_ladder(Subject(cartpole, "itself", quick=True), (1, 2, 3, 4, 5, 9)))
+    assert [result.verdict for result in results] == ["holds"] * 6
+    assert not any(math.isnan(figure.value) for figure in results[-1].figures)
+
+
+def test_an_order_that_rounding_hides_is_not_measured():
+    steep, hidden = ([2.0**-n for n in range(20)], [1e-9, 1e-11])
+    assert [figure.value for figure in _order_figures("it", 1, steep)] == [0.0, 1.0]
+    (figure,) = _order_figures("it", 4, hidden)
+    assert "too small to tell" in figure.name
+    assert figure.holds
+    assert not _order_figures("it", 1, hidden)[0].holds
+
+
+def test_what_dm_control_gives_up_on_is_no_crash():
+    pytest.importorskip("dm_control")
+    thick = changed(("<option ", '<option viscosity="1e300" '))
+    result = climb(thick, "itself", (10,))[1][10]
+    assert result.verdict == "skipped"
+    assert "dm_control does not step this document" in result.skipped
 
 
 @pytest.mark.parametrize("name", ["limit", "friction", "spring", "contact"])

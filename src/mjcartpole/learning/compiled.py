@@ -30,7 +30,7 @@ from mjcartpole.physics.model import CartPole, ModelLike, load_model
 from mjcartpole.physics.simulation import Simulation, check_sane
 
 CHUNK_STEPS: Final = 50_000
-"""Steps between two looks at what else is to be done: a twentieth of a second in MuJoCo."""
+"""Physics steps between two looks at what else is to be done: a twentieth of a second in MuJoCo."""
 
 LEAST_MEMORY: Final = 2**20
 """Bytes. Where MuJoCo runs out of its memory it ends the process, unless Python has called it."""
@@ -66,6 +66,7 @@ class CompiledLoop:
         )
         self._physics = _physics(self._simulation)
         self._poles = self._simulation.cartpole.poles if self._simulation else 1
+        self._chunk = _control_steps(self._simulation)
         limit = task.TIME_LIMIT
         self._scratch = kernels.Scratch(
             states=np.zeros(limit + 1, np.int64),
@@ -113,7 +114,7 @@ class CompiledLoop:
                     kernels.learn_chunk,
                     *common,
                     (number, numbers.stop),
-                    CHUNK_STEPS,
+                    self._chunk,
                     log.storage,
                     self._scratch,
                 )
@@ -137,7 +138,7 @@ class CompiledLoop:
                 kernels.play_chunk,
                 *common,
                 (len(log), episodes),
-                CHUNK_STEPS,
+                self._chunk,
                 log.storage,
                 self._scratch.failure,
             )
@@ -184,6 +185,11 @@ def _physics(simulation: Simulation | None) -> Physics:
         moved=np.zeros(len(cartpole.joints)),
         **common,
     )
+
+
+def _control_steps(simulation: Simulation | None) -> int:
+    """How many control steps make a chunk."""
+    return CHUNK_STEPS if simulation is None else -(-CHUNK_STEPS // simulation.cartpole.substeps)
 
 
 def _arrays(grid: Grid) -> Grid:

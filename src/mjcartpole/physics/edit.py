@@ -13,7 +13,7 @@ from typing import Final
 
 import numpy as np
 
-from mjcartpole.errors import ConfigError
+from mjcartpole.errors import ConfigError, ModelError
 from mjcartpole.physics.addresses import find_element, known_attributes, label_of
 from mjcartpole.physics.beyond import beyond_equations, beyond_step
 from mjcartpole.physics.document import Document, Element
@@ -24,6 +24,7 @@ from mjcartpole.physics.parameters import differences, read_parameters
 from mjcartpole.physics.parts import number_text
 from mjcartpole.physics.schema import attributes_of, did_you_mean
 from mjcartpole.physics.schema import tags as schema_tags
+from mjcartpole.physics.structure import directions
 
 EDIT_NAMES: Final[dict[str, str]] = {
     name: f"{meaning.text} ({meaning.unit})" for name, meaning in MEANINGS.items()
@@ -97,7 +98,9 @@ def check_key(key: str) -> None:
         raise ConfigError(f"{key!r}: <{tag}> has no attribute {attribute!r}, {hint}")
 
 
-def edit_document(document: str, edits: Mapping[str, object]) -> str:
+def edit_document(
+    document: str, edits: Mapping[str, object], name: str = "the XML document"
+) -> str:
     """A document with some things changed, and everything else as it was written.
 
     The order of the edits does not matter: those by meaning come first, those by element after
@@ -109,6 +112,7 @@ def edit_document(document: str, edits: Mapping[str, object]) -> str:
             pole's number, as pole2.length; by element, "tag:name.attribute" or
             "tag.attribute" where it is the only one, with steps into an element by dots
             (body:pole.inertial.mass, default:stop.geom.size): text, a number, or several numbers.
+        name: What a person calls the document.
 
     Raises:
         ConfigError: An edit names nothing that is there, or a value is outside physics.
@@ -122,7 +126,7 @@ def edit_document(document: str, edits: Mapping[str, object]) -> str:
     meanings = {key: meaning_of(key) for key in edits}
     values = {key: found.check(key, edits[key]) for key, found in meanings.items() if found}
     if values:
-        apply_meanings(edited, values)
+        apply_meanings(edited, values, name)
     _apply_elements(edited, {key: edits[key] for key in sorted(edits) if key not in values})
     return edited.text
 
@@ -146,13 +150,22 @@ def describe_edits(before: str, after: str) -> list[str]:
 
 
 def differs_from(cartpole: CartPole, reference: Parameters = CARTPOLE_V1) -> list[str]:
-    """All by which a model moves differently from a reference, one phrase each.
+    """All by which a model moves differently from a reference, one phrase each."""
+    return (
+        _other_parameters(cartpole, reference) + beyond_equations(cartpole) + beyond_step(cartpole)
+    )
 
-    Raises:
-        ModelError: Its parameters make no sense.
-    """
-    own = differences(read_parameters(cartpole), reference) if cartpole.poles == 1 else []
-    return own + beyond_equations(cartpole) + beyond_step(cartpole)
+
+def _other_parameters(cartpole: CartPole, reference: Parameters) -> list[str]:
+    """By which numbers of the equations a model differs, where it has these at all."""
+    if cartpole.poles > 1:
+        return []
+    if not directions(cartpole).up[2]:
+        return ["up is not z"]
+    try:
+        return differences(read_parameters(cartpole), reference)
+    except ModelError as error:
+        return [str(error)]
 
 
 def _apply_elements(document: Document, edits: Mapping[str, object]) -> None:

@@ -14,7 +14,7 @@ from mjcartpole.errors import ConfigError
 from mjcartpole.physics.addresses import find_element
 from mjcartpole.physics.bodies import cart_bodies, mass_of
 from mjcartpole.physics.document import Document
-from mjcartpole.physics.model import CartPole, load_model
+from mjcartpole.physics.model import CartPole, load_named
 from mjcartpole.physics.parameters import forces_of, pole_of
 from mjcartpole.physics.parts import Parts, number_text
 from mjcartpole.physics.rescale import set_cart_mass, set_length, set_pole_mass
@@ -89,18 +89,19 @@ def meaning_of(key: str) -> Meaning | None:
     return MEANINGS.get(_NUMBERED.sub(r"\1.", key))
 
 
-def apply_meanings(document: Document, values: Mapping[str, float]) -> None:
+def apply_meanings(document: Document, values: Mapping[str, float], name: str) -> None:
     """Make edits by meaning in a document.
 
     Args:
         document: A cart-pole; it is changed.
         values: Checked values by name.
+        name: What a person calls the document.
 
     Raises:
         ConfigError: The document leaves no room for an edit; the reason is said.
         ModelError: The document is no cart-pole, or is none afterwards.
     """
-    cartpole = _load(document)
+    cartpole = load_named(document.text, name)
     whole, by_pole = _sort_by_pole(values, cartpole.poles)
     _edit_options(document, cartpole.model, whole)
     parts = Parts(document)
@@ -110,7 +111,8 @@ def apply_meanings(document: Document, values: Mapping[str, float]) -> None:
     if "cart.mass" in whole:
         set_cart_mass(parts, cartpole, whole["cart.mass"])
     centres = [_edit_pole(document, cartpole, pole, wanted) for pole, wanted in enumerate(by_pole)]
-    after = _load(document)
+    name += f" with {', '.join(f'{key}={value:g}' for key, value in values.items())}"
+    after = load_named(document.text, name)
     _check_outcome(_found(after), whole)
     for pole, wanted in enumerate(by_pole):
         _check_outcome(_found_of_pole(after, pole), wanted)
@@ -156,12 +158,8 @@ def _edit_pole(
         longer = set_length(Parts(document), before, values["pole.length"], pole)
     if "pole.length" in values or "pole.mass" in values:
         mass = values.get("pole.mass", wanted.mass)
-        set_pole_mass(Parts(document), _load(document), mass, pole)
+        set_pole_mass(Parts(document), load_named(document.text, before.name), mass, pole)
     return longer * wanted.com
-
-
-def _load(document: Document) -> CartPole:
-    return load_model(document.text, own_timestep=True)
 
 
 def _edit_options(document: Document, model: mujoco.MjModel, values: Mapping[str, float]) -> None:

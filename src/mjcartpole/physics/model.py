@@ -155,10 +155,19 @@ def _load_edited(
     # An edit may be what makes a file's timestep fit.
     base = load_model(source, own_timestep=True)
     changes = edits_of(edits)
-    document = edit_document(base.xml, changes)
+    document = edit_document(base.xml, changes, base.name)
     what = ", ".join(f"{key}={value}" for key, value in changes.items())
     name = f"{base.name} with {what}"
     return _find_parts(name, *_from_text(document, name), own_timestep)
+
+
+def load_named(document: str, name: str) -> CartPole:
+    """Load a document that a person knows by a name; its timestep may be any.
+
+    Raises:
+        ModelError: It does not load, or is no cart-pole.
+    """
+    return _find_parts(name, *_from_text(document, name), own_timestep=True)
 
 
 def with_options(

@@ -331,14 +331,16 @@ def check_limits(name: str, parts: HasJoints) -> None:
     """
     model = parts.model
     for joint in (parts.slider, *parts.hinges):
-        place = "x = 0" if joint == parts.slider else "the upright position"
+        on_rail = joint == parts.slider
+        place, unit = ("x = 0", "m") if on_rail else ("the upright position", "rad")
         low, high = model.jnt_range[joint]
         if model.jnt_limited[joint] and not low <= 0.0 <= high:
             label = model.joint(joint).name or f"number {joint}"
             raise refusal(
                 name,
                 model,
-                f"a range from {low:g} to {high:g} of joint '{label}' that leaves out {place}",
+                f"a range from {low:g} to {high:g} {unit} of joint '{label}' that leaves out "
+                f"{place}",
             )
 
 

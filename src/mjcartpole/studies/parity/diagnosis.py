@@ -18,6 +18,10 @@ _ENOUGH = 0.9
 """A share of the squared error that one parameter must explain to be blamed alone."""
 
 
+_NOTHING = 0.01
+"""A share that says nothing."""
+
+
 def likely_cause(
     subject: Subject,
     integrator: Integrator,
@@ -55,6 +59,8 @@ def likely_cause(
     shares = [1 - float(np.sum((found - steps(p)) ** 2)) / total for _, p in candidates]
     best = int(np.argmax(shares))
     name, share = candidates[best][0], max(shares[best], 0.0)
+    if share < _NOTHING and not own:
+        return "likely cause: none of the parameters explains it"
     if share < _ENOUGH and len(own) > 1:
         return f"likely cause: more than one parameter: {'; '.join(own)}"
     return f"likely cause: {name} (alone it explains {share:.1%} of the error)"

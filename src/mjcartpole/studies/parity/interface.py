@@ -23,7 +23,7 @@ BOUNDS: tuple[dict[str, float], ...] = (
 def interface(subject: Subject) -> Result:
     """Rung 1: spaces, metadata, registration, and the first observations of many seeds."""
     ours, gyms = subject.ours(), gymnasium.make(GYM_ID, disable_env_checker=True)
-    problems = (*_declarations(ours, gyms), *_registration())
+    problems = (*_declarations(ours, gyms, subject.reference.timestep), *_registration())
     seeds = 40 if subject.quick else 400
     different = sum(
         not _same_reset(ours, gyms, seed, options) for seed in range(seeds) for options in BOUNDS
@@ -36,13 +36,17 @@ def interface(subject: Subject) -> Result:
     return Result(1, title, "equal by definition", figures, problems)
 
 
-def _declarations(ours: gymnasium.Env[Any, Any], gyms: gymnasium.Env[Any, Any]) -> list[str]:
-    found = []
-    for name in ("observation_space", "action_space", "metadata"):
-        a, b = getattr(ours, name), getattr(gyms, name)
-        if a != b:
-            found.append(f"{name} {a} instead of {b}")
-    return found
+def _declarations(
+    ours: gymnasium.Env[Any, Any], gyms: gymnasium.Env[Any, Any], timestep: float
+) -> list[str]:
+    # Gymnasium's declaration stays what it is, whatever `tau` it is given.
+    metadata = {**gyms.metadata, "render_fps": max(1, round(1 / timestep))}
+    pairs = {
+        "observation_space": (ours.observation_space, gyms.observation_space),
+        "action_space": (ours.action_space, gyms.action_space),
+        "metadata": (ours.metadata, metadata),
+    }
+    return [f"{name} {a} instead of {b}" for name, (a, b) in pairs.items() if a != b]
 
 
 def _registration() -> list[str]:

@@ -19,14 +19,28 @@ def dm_control(subject: Subject) -> Result:
         with warnings.catch_warnings():
             # It looks for a window system on import, and warns where there is none.
             warnings.simplefilter("ignore")
-            from dm_control import mujoco  # noqa: PLC0415 - slow to import, and may not load
+            # Slow to import, and may not load.
+            from dm_control import mujoco  # noqa: PLC0415
+            from dm_control.rl import control  # noqa: PLC0415
     except Exception as error:
         why = f"dm_control does not load: {type(error).__name__}: {error}"
         return Result(10, TITLE, REASON, skipped=" ".join(why.split()))
     if any(subject.cartpole.upright):
         why = "the document counts the pole's angle from elsewhere, so that bits cannot be equal"
         return Result(10, TITLE, REASON, skipped=why)
-    physics: Any = mujoco.Physics.from_xml_string(subject.cartpole.xml)
+    try:
+        different, compared = _count_differences(
+            subject, mujoco.Physics.from_xml_string(subject.cartpole.xml)
+        )
+    except (ValueError, control.PhysicsError) as error:
+        why = f"dm_control does not step this document: {error}"
+        return Result(10, TITLE, REASON, skipped=" ".join(why.split()))
+    figures = (Figure(f"steps that differ ({compared:,})", float(different), 0.0),)
+    return Result(10, TITLE, REASON, figures)
+
+
+def _count_differences(subject: Subject, physics: Any) -> tuple[int, int]:  # noqa: ANN401
+    """How many steps end at other bits, and of how many."""
     physics.legacy_step = False
     simulation = subject.simulation("mujoco")
     order = list(subject.cartpole.joints)
@@ -46,5 +60,4 @@ def dm_control(subject: Subject) -> Result:
             different += simulation.state[[0, 2, 1, 3]].tobytes() != theirs.tobytes()
             if np.abs(theirs).max() > FAR:
                 break  # dm_control refuses to go on where MuJoCo gives up
-    figures = (Figure(f"steps that differ ({compared:,})", float(different), 0.0),)
-    return Result(10, TITLE, REASON, figures)
+    return different, compared
