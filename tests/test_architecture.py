@@ -15,6 +15,7 @@ LAYERS = [
     "task",
     "integrator",
     "files",
+    "versions",
     "physics",
     "media",
     "envs",

@@ -285,3 +285,29 @@ def test_help(command, capsys):
     code, out, _ = call(command, capsys)
     assert code == 0
     assert "usage: mjcartpole" in out
+
+
+def test_a_run_at_the_files_own_timestep_is_evaluated_as_it_was_trained(here, capsys):
+    odd = load_model().xml.replace('timestep="0.02"', 'timestep="0.015"')
+    (here / "odd.xml").write_text(odd)
+    train = ["train", "--model", "odd.xml", *QUICK, "--run-dir", "mine"]
+    code, _, error = call(train, capsys)
+    assert (code, "does not divide" in error) == (2, True)
+    assert call([*train, "--own-timestep"], capsys)[0] == 0
+    stored = json.loads((here / "mine" / "summary.json").read_text())["evaluation"]
+    code, out, _ = call(["evaluate", "mine", "--json"], capsys)
+    assert (code, json.loads(out)["mean"]) == (0, stored["mean"])
+    assert call(["render", "mine", "--size", "64x48", "-o", "it.gif"], capsys)[0] == 0
+    assert call(["transfer", "mine", "--models", "odd.xml"], capsys)[0] == 2
+    transfer = ["transfer", "mine", "--models", "odd.xml", "--own-timestep", "--episodes", "3"]
+    assert call(transfer, capsys)[0] == 0
+    code, out, _ = call(["model", "show", "odd.xml", "--own-timestep"], capsys)
+    assert "1 step of 0.015 s per action, 0.015 s" in out
+    code, _, error = call(["evaluate", "mine", "--backend", "gym", "--own-timestep"], capsys)
+    assert (code, "asked for" in error) == (2, True)
+
+
+def test_the_word_after_set_is_an_edit_even_where_it_is_none(here, capsys):
+    code, _, error = call(["model", "show", "cartpole", "--set", "pole.length"], capsys)
+    assert code == 2
+    assert "'pole.length' is no edit; give NAME=VALUE" in error

@@ -27,7 +27,7 @@ from mjcartpole.studies.evaluation import evaluate
 from mjcartpole.studies.film import Film, Look, Stage, play
 from mjcartpole.studies.transfer import transfer
 
-CHAIN = str(Path(__file__).parent / "physics" / "models" / "chain.xml")
+CHAIN = str(Path(__file__).parent / "models" / "chain.xml")
 BESIDE = "twopoles"
 LIMIT = task.THETA_LIMIT
 both = pytest.mark.parametrize("model", [BESIDE, CHAIN], ids=["beside", "chain"])

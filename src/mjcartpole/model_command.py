@@ -23,7 +23,8 @@ def run_list() -> int:
     for name, what in EDIT_NAMES.items():
         print(f"  {name:16s} {what}")
     print(
-        "\nedits by element, for any attribute of MJCF: --set joint:hinge.damping=0.1\n"
+        "\nof several poles, one by its number: --set pole2.length=1.5\n"
+        "edits by element, for any attribute of MJCF: --set joint:hinge.damping=0.1\n"
         f"the files are in {models_folder()}"
     )
     return 0

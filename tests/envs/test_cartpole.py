@@ -12,10 +12,12 @@ from gymnasium.utils.env_checker import check_env
 
 from mjcartpole.envs import cartpole
 from mjcartpole.envs.cartpole import CartPoleEnv
+from mjcartpole.envs.vector import CartPoleVectorEnv
 from mjcartpole.errors import (
     ConfigError,
     InvalidActionError,
     ModelNotFoundError,
+    NotACartPoleError,
     RenderError,
     ResetNeededError,
     SimulationError,
@@ -303,3 +305,22 @@ def test_record_video_works(tmp_path):
         pass
     env.close()
     assert list(tmp_path.rglob("*.mp4"))
+
+
+@pytest.mark.parametrize("integrator", ["gym", "mujoco"])
+def test_a_control_step_can_be_the_files_own(integrator):
+    """0.015 s does not divide 0.02 s."""
+    odd = REFERENCE.replace('timestep="0.02"', 'timestep="0.015"')
+    with pytest.raises(NotACartPoleError, match="does not divide"):
+        CartPoleEnv(model=odd)
+    env = CartPoleEnv(model=odd, own_timestep=True, integrator=integrator)
+    assert env.metadata["render_fps"] == 67
+    assert CartPoleEnv.metadata["render_fps"] == 50
+    env.reset(seed=0)
+    env.state = (0.0, 1.0, 0.0, 0.0)
+    x, x_dot = env.step(1)[0][:2]
+    assert x == pytest.approx(0.015 * (1.0 if integrator == "gym" else x_dot), rel=1e-6)
+    vector = CartPoleVectorEnv(2, model=odd, own_timestep=True, integrator=integrator)
+    vector.reset(seed=0)
+    vector.state = [(0.0, 1.0, 0.0, 0.0)] * 2
+    assert vector.step([1, 1])[0][1][0] == x

@@ -48,6 +48,7 @@ def test_presets_name_fields_only(name):
     [
         ({"backend": "bullet"}, "backend 'bullet' is unknown; available: mujoco, gym"),
         ({"integrator": "rk4"}, "integrator 'rk4' is unknown"),
+        ({"backend": "gym", "own_timestep": True}, "asked for .*own-timestep"),
         ({"backend": "gym", "model": "long"}, "takes no model, integrator, timestep or edits"),
         ({"episodes": 0}, "episodes must be a whole number from 1 up, not 0"),
         ({"episodes": -5}, "not -5"),

@@ -19,6 +19,7 @@ from mjcartpole.learning.training import train
 from mjcartpole.media.renderer import open_renderer
 from mjcartpole.physics.describe import describe
 from mjcartpole.physics.model import load_model, models_folder, same_model
+from mjcartpole.physics.simulation import Simulation
 
 OURS = sorted((Path(__file__).parent / "models").glob("*.xml"))
 
@@ -219,7 +220,7 @@ NO_CART_POLES = {
     "hinge upright": (document().replace('axis="0 1 0"', 'axis="0 0 1"'), "about the vertical"),
     "short of upright": (
         document().replace('name="h"', 'name="h" range="10 20"'),
-        "range from 0.174533 to 0.349066 of joint 'h' that leaves out the upright position",
+        "range from 0.174533 to 0.349066 rad of joint 'h' that leaves out the upright position",
     ),
     "timestep that does not divide": (document().replace("0.02", "0.007"), "does not divide"),
     "long timestep": (document().replace("0.02", "0.05"), "does not divide"),
@@ -233,6 +234,19 @@ def test_what_is_no_cart_pole(case):
     with pytest.raises(NotACartPoleError, match=reason) as caught:
         load_model(text)
     assert_clear(caught.value)
+
+
+def test_a_hinge_whose_range_is_infinite_turns_freely():
+    """As people write it, `limited` by a default."""
+    free = document().replace('name="h"', 'name="h" limited="true" range="-inf inf"')
+    cartpole = load_model(free)
+    assert describe(cartpole).equations_apply
+    simulation, plain = (Simulation(load_model(each)) for each in (free, document()))
+    for each in (simulation, plain):
+        each.state = (0.0, 0.0, 3.0, 9.0)
+    assert [simulation.step(1.0) for _ in range(50)] == [plain.step(1.0) for _ in range(50)]
+    rail = document().replace('name="s"', 'name="s" limited="true" range="-inf inf"')
+    assert describe(load_model(rail)).rail_limits is None
 
 
 URDF = """<robot name="r"><link name="a"/><link name="b"/><joint name="j" type="prismatic">
@@ -293,7 +307,7 @@ TOO_MUCH = {
         "simulate the length ranges",
     ),
     "gravity": (document(more='<option gravity="0 0 nan"/>'), "NaN or infinite .gravity of"),
-    "range": (document().replace('name="h"', 'name="h" range="-inf inf"'), "NaN or infinite"),
+    "range": (document(motor='<motor joint="s" ctrlrange="-inf inf"/>'), "NaN or infinite"),
     "no time": (document().replace('"0.02"', '"0"'), "timestep of 0 s"),
     "drag": (
         document()

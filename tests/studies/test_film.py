@@ -10,13 +10,14 @@ import pytest
 
 from mjcartpole.errors import ConfigError, RenderError
 from mjcartpole.learning.discretizer import Discretizer
+from mjcartpole.learning.episodes import Episode
 from mjcartpole.learning.policy import Policy
 from mjcartpole.media.montage import state_at
 from mjcartpole.media.overlay import Overlay
 from mjcartpole.media.renderer import open_renderer
 from mjcartpole.physics.model import load_model
 from mjcartpole.studies.evaluation import SEED, evaluate
-from mjcartpole.studies.film import FALL_SECONDS, FALL_SPEED, Film, Look, Stage, play
+from mjcartpole.studies.film import FALL_SECONDS, FALL_SPEED, Film, Look, Stage, Take, play
 from mjcartpole.task import CONTROL_STEP
 
 WIDTH, HEIGHT = 160, 120
@@ -296,3 +297,17 @@ def test_memory_does_not_grow_with_the_length_of_a_film(tmp_path, speed):
     frames, growth = map(int, done.stdout.split())
     # All frames would be 113 kilobytes each.
     assert growth < 8_000 < 30 * frames
+
+
+def test_a_film_takes_the_time_that_control_steps_take():
+    cartpole = load_model("cartpole", {"timestep": 0.01}, own_timestep=True)
+    states = np.zeros((101, 4))
+    slow, quick = (
+        Take(Stage("it", some_policy(), model=model), Episode(0, 100.0, 100, "time limit"), states)
+        for model in ("cartpole", cartpole)
+    )
+    assert slow.places(Look()).tolist() == list(range(101))
+    assert quick.places(Look()).tolist() == list(range(0, 101, 2))
+    assert len(slow.places(Look(fall=True))) == len(quick.places(Look(fall=True))) == 201
+    assert quick.places(Look(fall=True))[0] == 0.0
+    assert slow.places(Look(fall=True))[0] == 50.0

@@ -142,8 +142,9 @@ class CartPoleVectorEnv(
         self.cartpole = load_model(model, edits, own_timestep=own_timestep)
         if render_mode is not None or (width, height, camera) != _DEFAULT_PICTURE:
             check_picture(self.cartpole, width, height, camera)
-        fps = max(1, round(1 / self.cartpole.control_step))
-        self.metadata = {**self.metadata, "render_fps": fps}
+        self.metadata = self.metadata | {
+            "render_fps": max(1, round(1 / self.cartpole.control_step))
+        }
         bound = task.observation_bound(self.cartpole.poles)
         self.single_observation_space = spaces.Box(-bound, bound, dtype=np.float32)
         self.single_action_space = spaces.Discrete(task.N_ACTIONS)
@@ -167,8 +168,7 @@ class CartPoleVectorEnv(
         self._fresh = batch.state[0].copy()
         qpos, qvel = batch.bind("qpos"), batch.bind("qvel")
         # The batch keeps one row per environment; these are columns of it, shape (num_envs,).
-        self._qpos = [qpos[:, joint] for joint in cartpole.joints]
-        self._qvel = [qvel[:, joint] for joint in cartpole.joints]
+        self._columns = [(qpos[:, joint], qvel[:, joint]) for joint in cartpole.joints]
         self._control = batch.bind("ctrl")[:, 0]
         self._controls = np.array(cartpole.controls)
 
@@ -299,13 +299,13 @@ class CartPoleVectorEnv(
             np.multiply(self._velocities, self._timestep, out=self._moves)
             self._positions += self._moves
             self._batch.step()
-            for joint, (qpos, qvel) in enumerate(zip(self._qpos, self._qvel, strict=True)):
+            for joint, (qpos, qvel) in enumerate(self._columns):
                 qpos[...] = self._positions[:, joint]
                 self._velocities[:, joint] = qvel
 
     def _own_integrator(self) -> None:
         self._batch.step(nstep=self.cartpole.substeps)
-        for joint, (qpos, qvel) in enumerate(zip(self._qpos, self._qvel, strict=True)):
+        for joint, (qpos, qvel) in enumerate(self._columns):
             self._positions[:, joint], self._velocities[:, joint] = qpos, qvel
 
     def _have_terminated(self) -> npt.NDArray[np.bool_]:
@@ -324,8 +324,7 @@ class CartPoleVectorEnv(
         return over
 
     def _refuse_diverged(self) -> None:
-        insane = ~(self._sizes < LARGEST_SANE).all(axis=1)
-        index = int(np.flatnonzero(insane)[0])
+        index = int(np.flatnonzero(~(self._sizes < LARGEST_SANE).all(axis=1))[0])
         name = f"{self.cartpole.name} (environment {index} of {self.num_envs})"
         check_sane(tuple(self._state[index].tolist()), name)
 
@@ -348,7 +347,7 @@ class CartPoleVectorEnv(
         else:
             # The row is all there is, and to copy it is a hundred times quicker than `reset`.
             self._batch.state[ids] = self._fresh
-        for joint, (qpos, qvel) in enumerate(zip(self._qpos, self._qvel, strict=True)):
+        for joint, (qpos, qvel) in enumerate(self._columns):
             qpos[ids], qvel[ids] = states[:, 2 * joint], states[:, 2 * joint + 1]
         self._state[ids] = states
 
@@ -385,8 +384,7 @@ class CartPoleVectorEnv(
 
 def _needs_own_data(model: mujoco.MjModel) -> bool:
     """Whether a model remembers more than its state, so that each environment needs an MjData."""
-    enable = mujoco.mjtEnableBit
-    remembering = int(enable.mjENBL_SLEEP) | int(enable.mjENBL_IPC)
+    remembering = int(mujoco.mjtEnableBit.mjENBL_SLEEP) | int(mujoco.mjtEnableBit.mjENBL_IPC)
     return bool(model.opt.enableflags & remembering) or model.nplugin > 0
 
 

@@ -76,6 +76,19 @@ class EpisodeLog(Sequence[Episode]):
         log._put(slice(log._length), *columns)
         return log
 
+    def csv(self) -> str:
+        """One line per episode, numbered from 1, under a line of names."""
+        # There are few different ones, so each is put together once.
+        tails: dict[tuple[float, int, int], str] = {}
+        lines = ["episode,return,steps,ending\n"]
+        columns = (column.tolist() for column in self.columns)
+        for number, episode in enumerate(zip(*columns, strict=True), start=1):
+            if episode not in tails:
+                total, steps, ending = episode
+                tails[episode] = f",{total},{steps},{ENDINGS[ending]}\n"
+            lines.append(f"{number}{tails[episode]}")
+        return "".join(lines)
+
     @property
     def columns(self) -> Columns:
         """The episodes so far, each column of shape (len(log),); views."""

@@ -19,7 +19,6 @@ import os
 import platform
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from importlib import metadata
 from pathlib import Path
 from typing import Any, Final
 
@@ -37,11 +36,11 @@ from mjcartpole.learning.checkpoints import (
     load_checkpoint,
 )
 from mjcartpole.learning.config import TrainConfig
-from mjcartpole.learning.episodes import ENDINGS, EpisodeLog
 from mjcartpole.learning.folders import LOCK, held_folder, locked_folder
 from mjcartpole.learning.policy import Policy
 from mjcartpole.learning.training import TrainResult
 from mjcartpole.physics.model import CartPole, load_model, same_model
+from mjcartpole.versions import version_of
 
 CONFIG, VERSIONS, MODEL = "config.json", "versions.json", "model.xml"
 EPISODES, POLICY, SUMMARY, TIMING = "episodes.csv", "policy.json", "summary.json", "timing.json"
@@ -164,7 +163,7 @@ def write_results(folder: Path, result: TrainResult, summary: dict[str, Any]) ->
     Raises:
         FileError: The folder cannot be written.
     """
-    write_whole(folder / EPISODES, _csv(result.episodes))
+    write_whole(folder / EPISODES, result.episodes.csv())
     result.policy.save(folder / POLICY)
     seconds = round(result.seconds, 3)
     write_whole(folder / TIMING, _json({"training_seconds": seconds, "steps": result.steps}))
@@ -317,12 +316,7 @@ def run_folder(path: Path) -> Path:
 def versions() -> dict[str, str]:
     """Versions of all that a result may depend on."""
     found = {"python": platform.python_version(), "platform": platform.platform()}
-    for package in PACKAGES:
-        try:
-            found[package] = metadata.version(package)
-        except metadata.PackageNotFoundError:
-            found[package] = "not installed"
-    return found
+    return found | {package: version_of(package) or "not installed" for package in PACKAGES}
 
 
 def _checkpoint(
@@ -400,16 +394,3 @@ def _read_config(path: Path) -> tuple[str, bool, TrainConfig]:
 
 def _json(values: dict[str, Any]) -> str:
     return json.dumps(values, indent=2) + "\n"
-
-
-def _csv(log: EpisodeLog) -> str:
-    """One line per episode. There are few different ones, so each is put together once."""
-    tails: dict[tuple[float, int, int], str] = {}
-    lines = ["episode,return,steps,ending\n"]
-    columns = (column.tolist() for column in log.columns)
-    for number, episode in enumerate(zip(*columns, strict=True), start=1):
-        if episode not in tails:
-            total, steps, ending = episode
-            tails[episode] = f",{total},{steps},{ENDINGS[ending]}\n"
-        lines.append(f"{number}{tails[episode]}")
-    return "".join(lines)

@@ -5,12 +5,12 @@ import platform
 import sys
 from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass
-from importlib.metadata import PackageNotFoundError, version
 from typing import Any, Final, get_args
 
 from mjcartpole.media import encoders, gl
 from mjcartpole.media.encoders import FFmpeg
 from mjcartpole.media.trial import Backend, Trial, try_backend
+from mjcartpole.versions import version_of
 
 PACKAGES: Final = (
     "mjcartpole",
@@ -123,7 +123,7 @@ def examine() -> Report:
     reports = [_report(trials[backend], chosen, order) for backend in get_args(Backend)]
     return Report(
         system=_system(),
-        versions={name: _version(name) for name in PACKAGES},
+        versions={name: version_of(name) for name in PACKAGES},
         environment={name: _variable(name) for name in VARIABLES if name in os.environ},
         ffmpegs=tuple(map(encoders.examine, encoders.SOURCES)),
         backends=(*reports, _report_sketch(chosen)),
@@ -201,13 +201,6 @@ def _variable(name: str) -> str:
         wrong = "no window opens there"
     value = os.environ[name] or "empty"
     return f"{value} ({wrong})" if wrong else value
-
-
-def _version(package: str) -> str | None:
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return None
 
 
 def _lines(report: Report) -> Iterator[str]:

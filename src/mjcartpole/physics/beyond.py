@@ -121,8 +121,9 @@ def _joints(cartpole: CartPole) -> Iterator[str]:
     solver = _on(model, bit.mjDSBL_CONSTRAINT)
     for joint in cartpole.joints:
         name = joint_label(model, joint)
-        if model.jnt_limited[joint] and solver and _on(model, bit.mjDSBL_LIMIT):
-            low, high = model.jnt_range[joint]
+        low, high = model.jnt_range[joint]
+        limited = model.jnt_limited[joint] and np.isfinite([low, high]).any()
+        if limited and solver and _on(model, bit.mjDSBL_LIMIT):
             yield f"limit of {name} at {low:g} and {high:g}"
         if model.dof_frictionloss[joint] and solver and _on(model, bit.mjDSBL_FRICTIONLOSS):
             yield f"friction loss in {name}"

@@ -177,6 +177,7 @@ def describe(cartpole: CartPole) -> Description:
     found = [directions(cartpole, pole) for pole in range(cartpole.poles)]
     low, high = (push(model, slider, control) for control in cartpole.controls)
     limits = [float(end) for end in model.jnt_range[slider]]
+    has_ends = model.jnt_limited[slider] and np.isfinite(limits).any()
     return Description(
         name=cartpole.name,
         cart=_joint(model, slider),
@@ -192,7 +193,7 @@ def describe(cartpole: CartPole) -> Description:
         substeps=cartpole.substeps,
         integrator=cartpole.integrator,
         cart_mass=mass_of(model, cart_bodies(cartpole)),
-        rail_limits=(limits[0], limits[1]) if model.jnt_limited[slider] else None,
+        rail_limits=(limits[0], limits[1]) if has_ends else None,
         beyond=_beyond(cartpole, found[0]),
         beyond_step=tuple(beyond_step(cartpole)),
     )

@@ -14,6 +14,9 @@ from mjcartpole.physics.bodies import HasJoints
 MOST_MEMORY: Final = 2**30
 """Bytes that a model may ask for, for contacts and constraints."""
 
+_MAY_BE_INFINITE: Final = {"jnt_range", "tendon_range"}
+"""People write -inf and inf for a joint that turns freely; no limit is reached then."""
+
 MOST_ITERATIONS: Final = 10_000
 """Of a solver, per step."""
 
@@ -48,7 +51,9 @@ def check_numbers(name: str, model: mujoco.MjModel) -> None:
     for part in ("model", "opt", "stat"):
         owner = _part(model, part)
         for field in _float_fields(part):
-            if not np.isfinite(getattr(owner, field)).all():
+            values = getattr(owner, field)
+            bad = np.isnan(values) if field in _MAY_BE_INFINITE else ~np.isfinite(values)
+            if bad.any():
                 raise ModelError(
                     f"{name} has a number that is NaN or infinite ({field} of MuJoCo's {part}); "
                     "look for nan, inf and numbers far too large"

@@ -191,7 +191,8 @@ def find_substeps(name: str, model: mujoco.MjModel) -> int:
     if substeps < 1 or abs(substeps * timestep - task.CONTROL_STEP) > 1e-12:
         raise NotACartPoleError(
             f"{name}: timestep {timestep:g} s does not divide the control step of "
-            f"{task.CONTROL_STEP} s; use 0.02, 0.01, 0.005, 0.002 …"
+            f"{task.CONTROL_STEP} s; use 0.02, 0.01, 0.005, 0.002 …, or take the file's own as the "
+            "control step (--own-timestep, own_timestep=True)"
         )
     return substeps
 
