@@ -120,7 +120,7 @@ def test_a_damaged_policy_is_refused(run):
         runs.load_run(run)
 
 
-def test_a_model_that_needs_other_files_is_refused_before_training(tmp_path):
+def test_a_model_leads_to_its_other_files_as_long_as_they_are_there(tmp_path):
     vertices = "0 0 0  1 0 0  0 1 0  0 0 1"
     obj = "".join(f"v {vertex}\n" for vertex in vertices.split("  "))
     (tmp_path / "m.obj").write_text(obj + "f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n")
@@ -128,9 +128,11 @@ def test_a_model_that_needs_other_files_is_refused_before_training(tmp_path):
     text = text.replace("<worldbody>", '<asset><mesh name="m" file="m.obj"/></asset><worldbody>', 1)
     text = text.replace('<body name="pole">', '<body name="pole"><geom type="mesh" mesh="m"/>')
     (tmp_path / "mesh.xml").write_text(text, encoding="utf-8")
+    cartpole = load_model(tmp_path / "mesh.xml")
+    runs.check_storable(cartpole)
+    (tmp_path / "m.obj").unlink()
     with pytest.raises(ModelError, match="needs other files beside it"):
-        runs.check_storable(load_model(tmp_path / "mesh.xml"))
-    runs.check_storable(load_model())
+        runs.check_storable(cartpole)
 
 
 def checkpointed(folder, config, episodes):

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mjcartpole.errors import ModelSyntaxError
-from mjcartpole.physics.document import Document
+from mjcartpole.physics.document import Document, made_strict
 
 TEXT = """<?xml version='1.0'?>
 <!-- before: <joint name="not me"/> -->
@@ -103,6 +103,45 @@ def test_a_section_is_put_on_a_line_of_its_own():
 def test_a_section_finds_room_anywhere(text, expected):
     document = Document(text)
     document.set(document.insert(document.root, "size"), "njmax", "1")
+    assert document.text == expected
+
+
+LENIENT = """<!---- ä -- <joint name="not me"/> --><mujoco><!----> <a b="1"/> <!--> ü
+--\r\n <c/> --><worldbody/>
+</mujoco><!-- -- -->
+"""
+
+
+def test_comments_as_people_write_them_stay():
+    document = Document(LENIENT)
+    assert [each.tag for each in document.root.walk()] == ["mujoco", "a", "worldbody"]
+    document.set(the(document, "a"), "b", "2")
+    document.set(document.insert(document.root, "size"), "njmax", "1")
+    document.set(the(document, "worldbody"), "name", "w")
+    assert document.text == LENIENT.replace('"1"', '"2"').replace(
+        "<mujoco>", '<mujoco><size njmax="1"/>'
+    ).replace("<worldbody", '<worldbody name="w"')
+
+
+@given(st.lists(st.sampled_from(["<!--", "-->", "--", "-", ">", "<a/>", "ä", "\n", "\r", " "])))
+def test_empty_comments_keep_every_byte_in_its_place(parts):
+    text = "".join(parts)
+    blank = made_strict(text)
+    pairs = list(zip(text.encode(), blank.encode(), strict=True))
+    assert all(new in {old, ord(" ")} for old, new in pairs)
+    assert made_strict(blank) == blank
+
+    assert [each for each in blank if each in "\r\n"] == [each for each in text if each in "\r\n"]
+
+
+def test_a_tag_with_spaces_before_its_name_is_edited_where_it_stands():
+    """MuJoCo takes it, and people have such files."""
+    text = '<mujoco>\n <  option a="1"/>\n <\n body\n b="2"/></mujoco>'
+    document = Document(text)
+    option, body = document.root.children
+    document.set(option, "a", "10")
+    document.set(body, "c", "3")
+    expected = text.replace('"1"', '"10"').replace('b="2"', 'b="2" c="3"')
     assert document.text == expected
 
 

@@ -236,6 +236,9 @@ def test_comments_as_people_write_them_are_taken():
     text = changed("<worldbody>", "<!---- a -- b ----><worldbody>")
     assert same_model(load_model(text).model, load_model().model)
     assert load_model(text).xml == text
+    heavy = load_model(text, {"cart.mass": 2})
+    assert "<!---- a -- b ---->" in heavy.xml
+    assert heavy.model.body("cart").mass[0] == 2
 
 
 def test_integrators_are_numbered_as_in_mujoco():

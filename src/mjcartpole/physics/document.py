@@ -14,6 +14,9 @@ from xml.sax.saxutils import escape
 
 from mjcartpole.errors import ModelSyntaxError
 
+_COMMENT: Final = re.compile(rb"<!--(.*?)-->", re.DOTALL)
+_SPACED_TAG: Final = re.compile(rb"<(\s+)(?=[A-Za-z])")
+
 _ATTRIBUTE: Final = re.compile(rb"""\s+([^\s=/>"']+)\s*=\s*("[^"]*"|'[^']*')""")
 
 
@@ -137,7 +140,7 @@ class Document:
         parser.EntityDeclHandler = entity
         try:
             self._bytes = text.encode("utf-8")
-            parser.Parse(text, True)
+            parser.Parse(made_strict(text), True)
         except (expat.ExpatError, UnicodeEncodeError) as error:
             raise ModelSyntaxError(
                 f"the document cannot be edited, it is not well-formed XML: {error}"
@@ -185,6 +188,22 @@ class Document:
         for index in path:
             element = element.children[index]
         return element
+
+
+def made_strict(text: str) -> str:
+    """The text as strict parsers take it: what matters of it stays in its place, byte by byte.
+
+    MuJoCo is lenient: it takes comments with "--" in them, and tags with spaces before their name.
+
+    Raises:
+        UnicodeEncodeError: It holds half a character.
+    """
+
+    def blank(found: re.Match[bytes]) -> bytes:
+        return b"<!--" + re.sub(rb"[^\r\n]", b" ", found[1]) + b"-->"
+
+    without_comments = _COMMENT.sub(blank, text.encode("utf-8"))
+    return _SPACED_TAG.sub(rb"\1<", without_comments).decode("utf-8")
 
 
 def _quoted(value: str, quote: str) -> str:

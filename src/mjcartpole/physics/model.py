@@ -223,11 +223,13 @@ def find_model(source: str | os.PathLike[str]) -> Path:
 def _from_file(path: Path) -> tuple[str, mujoco.MjModel]:
     """The document, whole, and the compiled model."""
     xml = stand_alone(read_text(path), str(path), path.parent)
-    return xml, _compile(xml, str(path), path)
+    # By a relative path MuJoCo does not find all files of included files, and the compiled model
+    # holds the paths of its files.
+    return xml, _compile(xml, str(path), path.parent.resolve() / path.name)
 
 
 def _from_text(text: str, name: str) -> tuple[str, mujoco.MjModel]:
-    """The document, whole, and the compiled model; includes are sought where the program runs."""
+    """The document, whole, and the compiled model; its files are sought where the program runs."""
     xml = stand_alone(text, name, Path())
     return xml, _compile(xml, name)
 
@@ -239,7 +241,8 @@ def _from_spec(spec: mujoco.MjSpec) -> tuple[str, str, mujoco.MjModel]:
     except (ValueError, mujoco.FatalError) as error:
         raise ModelSyntaxError(f"the MjSpec does not compile: {_one_line(error)}") from error
     # MuJoCo writes numbers with six digits: this text is for reading, `model` is what runs.
-    return spec.modelname or "the MjSpec", spec.to_xml(), model
+    xml = stand_alone(spec.to_xml(), "the MjSpec", Path(spec.modelfiledir))
+    return spec.modelname or "the MjSpec", xml, model
 
 
 def _compile(text: str, name: str, path: Path | None = None) -> mujoco.MjModel:
@@ -271,7 +274,8 @@ def _bytes_of(model: mujoco.MjModel) -> bytes:
 def self_contained(text: str, folder: Path) -> str:
     """The document with the content of its `<include>` files in their place.
 
-    A document without includes is returned as it is, to the last character.
+    Other files that it needs, such as meshes, it then names by absolute paths. A document without
+    any of these is returned as it is, to the last character.
 
     Raises:
         ModelError: The document or an included file cannot be read.

@@ -1,11 +1,13 @@
 """An MJCF is read with its includes, and refused where loading it would not end well.
 
-MuJoCo reads `<include>` relative to the folder of the main file, and each file once. It does as
-it is told where a document asks for a million copies or a texture of many gigabytes; those
-numbers are looked at first.
+MuJoCo reads `<include>` relative to the folder of the main file or of the file that includes, and
+each file once. It does as it is told where a document asks for a million copies, a texture of many
+gigabytes or a model that attaches itself; those numbers and files are looked at first.
 """
 
 import math
+import os
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 from xml.etree import ElementTree
@@ -16,17 +18,38 @@ from mjcartpole.errors import (
     ModelSyntaxError,
     NotACartPoleError,
 )
+from mjcartpole.physics.assets import (
+    MODEL,
+    Asset,
+    Folders,
+    check_files,
+    find_assets,
+    folders_of,
+    what_else,
+    with_absolute_paths,
+)
+from mjcartpole.physics.document import made_strict
+from mjcartpole.physics.soundness import MOST_ITERATIONS
 
 LARGEST_FILE: Final = 2**24
 """Bytes of one file of a document."""
 
 MOST_ELEMENTS: Final = 5_000
-"""Elements of a document, with all copies that `<replicate>` and its like make of them."""
+"""Elements of a document, with attached models and all copies by `<replicate>` and its like."""
 
 DEEPEST: Final = 200
 """Levels of elements inside each other."""
 
+DEEPEST_MODELS: Final = 20
+"""Levels of models attached to each other."""
+
 _COPYING: Final = ("replicate", "composite", "flexcomp")
+
+_ITERATIONS: Final = (
+    "iterations", "ls_iterations", "noslip_iterations", "ccd_iterations", "sdf_iterations",
+    "sdf_initpoints",
+)  # fmt: skip
+"""Attributes of <option>. MuJoCo runs its solver while it compiles, so that later is too late."""
 
 _UNITS: Final = {"K": 2**10, "M": 2**20, "G": 2**30, "T": 2**40, "P": 2**50, "E": 2**60}
 
@@ -50,29 +73,79 @@ _LIMITS: Final = (
 """Element (None: any), attributes whose product counts, and the largest product allowed."""
 
 
-def read_text(path: Path) -> str:
+@dataclass(frozen=True)
+class _Origin:
+    """The included file that an element comes from.
+
+    Attributes:
+        name: What a person calls it.
+        folder: Where it is, absolute.
+    """
+
+    name: str
+    folder: Path
+
+
+@dataclass(frozen=True)
+class _Reading:
+    """A document with its includes in their place.
+
+    Attributes:
+        name: What a person calls it.
+        root: Its outermost element.
+        folders: Where the files that it names are sought.
+        assets: These files.
+    """
+
+    name: str
+    root: ElementTree.Element
+    folders: Folders
+    assets: list[Asset]
+
+
+@dataclass
+class _Family:
+    """The models that are attached to a document, each looked at once.
+
+    Attributes:
+        elements: By a model's file, how many elements it comes to.
+        above: The files that are being looked at, each attached to the one before it.
+    """
+
+    elements: dict[str, float] = field(default_factory=dict)
+    above: list[str] = field(default_factory=list)
+
+
+def read_text(path: Path, name: str = "") -> str:
     """The text of a file.
 
+    Args:
+        path: Where it is.
+        name: What a person calls it; without one it is the model file of that path.
+
     Raises:
-        ModelNotFoundError: It cannot be read.
+        ModelNotFoundError: It cannot be read, or is no regular file.
         ModelSyntaxError: It is too large to be a document, or not text in UTF-8.
     """
+    name = name or f"model file '{path}'"
+    if kind := what_else(path):
+        raise ModelNotFoundError(f"{name} cannot be read: '{path}' is {kind}")
     try:
         size = path.stat().st_size
-        content = path.read_bytes() if size <= LARGEST_FILE else b""
+        with path.open("rb") as file:
+            content = file.read(LARGEST_FILE + 1)
     except (OSError, ValueError) as error:
-        raise ModelNotFoundError(f"model file '{path}' cannot be read: {error}") from error
-    if size > LARGEST_FILE:
+        raise ModelNotFoundError(f"{name} cannot be read: {error}") from error
+    if len(content) > LARGEST_FILE:
         raise ModelSyntaxError(
-            f"model file '{path}' has {size} bytes; an MJCF is XML of some kilobytes, "
+            f"{name} has {max(size, len(content))} bytes; an MJCF is XML of some kilobytes, "
             f"and no more than {LARGEST_FILE} bytes are read"
         )
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise ModelSyntaxError(
-            f"model file '{path}' is not text in UTF-8 (byte {error.start} does not fit); "
-            "save it as UTF-8"
+            f"{name} is not text in UTF-8 (byte {error.start} does not fit); save it as UTF-8"
         ) from error
 
 
@@ -80,25 +153,25 @@ def stand_alone(text: str, name: str, folder: Path) -> str:
     """The document with the content of its included files in their place.
 
     Args:
-        text: As it was written. Without includes it is returned to the last character.
+        text: As it was written. Without includes and other files it is returned to the last
+            character.
         name: What a person calls it.
-        folder: Where its includes are.
+        folder: Where its includes and other files are; the document names the latter by absolute
+            paths.
 
     Raises:
-        ModelNotFoundError: An included file cannot be read.
-        ModelSyntaxError: It is no XML, no MJCF, or includes a file twice.
+        ModelNotFoundError: An included file, or a model that it attaches, cannot be read.
+        ModelSyntaxError: It is no XML, no MJCF, includes a file twice or attaches itself.
         ModelError: It asks for more copies, pixels or nesting than any cart-pole needs.
         NotACartPoleError: It has a muscle.
     """
     root = _parse(text, name)
-    if root.tag != "mujoco":
-        urdf = " (a URDF; MuJoCo can save it as MJCF)" if root.tag == "robot" else ""
-        raise _invalid(name, f"its outermost element is <{root.tag}>{urdf}, not <mujoco>")
     includes = root.find(".//include") is not None
+    reading = _read(root, name, folder.resolve())
+    _count(reading, _Family())
     if includes:
-        _put_includes(root, name, folder)
-    _check_amounts(root, name)
-    return ElementTree.tostring(root, encoding="unicode") if includes else text
+        text = ElementTree.tostring(reading.root, encoding="unicode")
+    return with_absolute_paths(text, reading.assets, reading.folders)
 
 
 def _invalid(name: str, reason: str) -> ModelSyntaxError:
@@ -115,47 +188,126 @@ def _parse(text: str, name: str) -> ElementTree.Element:
         return ElementTree.fromstring(text, parser)
     except (ElementTree.ParseError, ValueError) as error:
         reason = error
-    # MuJoCo takes comments with "--" in them, as people write them.
+    # What MuJoCo takes, as people write it.
     try:
-        return ElementTree.fromstring(_without_comments(text))
+        return ElementTree.fromstring(made_strict(text))
     except (ElementTree.ParseError, ValueError):
         raise _invalid(name, f"it is not well-formed XML: {reason}") from reason
 
 
-def _without_comments(text: str) -> str:
-    """The text with line breaks in place of its comments."""
-    kept, place = [], 0
-    while (start := text.find("<!--", place)) >= 0 and (end := text.find("-->", start + 4)) >= 0:
-        kept += [text[place:start], "\n" * text.count("\n", start, end)]
-        place = end + 3
-    return "".join([*kept, text[place:]])
+def _read(root: ElementTree.Element, name: str, folder: Path) -> _Reading:
+    """Put a document's includes in their place and find the files that it names."""
+    if root.tag != "mujoco":
+        urdf = " (a URDF; MuJoCo can save it as MJCF)" if root.tag == "robot" else ""
+        raise _invalid(name, f"its outermost element is <{root.tag}>{urdf}, not <mujoco>")
+    origins = _put_includes(root, name, folder)
+    folders = folders_of(root, folder)
+    assets = find_assets(root, folders, {each: origins[each].folder for each in origins})
+    check_files(assets, name)
+    return _Reading(name, root, folders, assets)
 
 
-def _put_includes(root: ElementTree.Element, name: str, folder: Path) -> None:
+def _put_includes(
+    root: ElementTree.Element, name: str, folder: Path
+) -> dict[ElementTree.Element, _Origin]:
+    """Put the content of included files in their place; returns what came from where."""
+    origins: dict[ElementTree.Element, _Origin] = {}
     seen: set[str] = set()
     parents = [root]
     while parents:
         parent, place = parents.pop(), 0
         while place < len(parent):
-            if parent[place].tag != "include":
+            include = parent[place]
+            if include.tag != "include":
                 place += 1
                 continue
-            file = parent[place].get("file", "")
-            if file in seen:
+            origin = origins.get(include, _Origin(name, folder))
+            path = _included_file(include, origin, folder)
+            if (key := os.path.realpath(path)) in seen:
+                file = include.get("file")
                 raise _invalid(name, f"it includes '{file}' more than once, or in a circle")
-            seen.add(file)
-            included = _parse(read_text(folder / file), f"'{file}', which {name} includes,")
+            seen.add(key)
+            who = f"'{include.get('file')}', which {origin.name} includes,"
+            included = _parse(read_text(path, who), who)
+            came = _Origin(f"'{include.get('file')}'", path.parent)
+            origins.update(dict.fromkeys(included.iter(), came))
             parent[place : place + 1] = list(included)
         parents.extend(parent)
+    return origins
 
 
-def _check_amounts(root: ElementTree.Element, name: str) -> None:
-    """Refuse what would keep MuJoCo busy for ever, or fill the memory."""
-    total, waiting = 0.0, [(root, 0, 1.0)]
+def _included_file(include: ElementTree.Element, origin: _Origin, folder: Path) -> Path:
+    """Where an included file is: beside the main file, else beside the one that includes it."""
+    file = include.get("file", "").replace("\\", "/")
+    if not file:
+        raise ModelNotFoundError(
+            f"{origin.name} cannot be read whole: an <include> of it names no file; "
+            'write <include file="..."/>'
+        )
+    usual, beside = folder / file, origin.folder / file
+    try:
+        return usual if usual.exists() or not beside.exists() else beside
+    except (OSError, ValueError):
+        return usual
+
+
+def _count(reading: _Reading, family: _Family) -> float:
+    """How many elements a document and the models that it attaches come to.
+
+    Raises:
+        ModelError: They are too many, or ask for too much.
+    """
+    attached = [_count_file(asset, reading, family) for asset in _models(reading)]
+    return _check_amounts(reading.root, reading.name, attached)
+
+
+def _models(reading: _Reading) -> list[Asset]:
+    found = [asset for asset in reading.assets if asset.tag == MODEL]
+    if len(found) != len(list(reading.root.iter(MODEL))):
+        raise _invalid(reading.name, "a <model> of it names no file")
+    return found
+
+
+def _count_file(asset: Asset, reading: _Reading, family: _Family) -> float:
+    """How many elements an attached model comes to; MuJoCo follows a circle until it crashes."""
+    key = os.path.realpath(asset.path)
+    if key in family.elements:
+        return family.elements[key]
+    if key in family.above:
+        raise _invalid(reading.name, f"it attaches '{asset.name}' in a circle")
+    if len(family.above) >= DEEPEST_MODELS:
+        raise ModelError(
+            f"{reading.name} is one of models attached to each other more than {DEEPEST_MODELS} "
+            "levels deep"
+        )
+    who = f"'{asset.name}', which {reading.name} attaches,"
+    family.above.append(key)
+    root = _parse(read_text(asset.path, who), who)
+    count = _count(_read(root, f"'{asset.name}'", asset.path.parent), family)
+    family.above.pop()
+    family.elements[key] = count
+    return count
+
+
+def _check_amounts(root: ElementTree.Element, name: str, attached: list[float]) -> float:
+    """Refuse what would keep MuJoCo busy for ever, or fill the memory.
+
+    Args:
+        root: The outermost element of a document.
+        name: What a person calls it.
+        attached: How many elements the models come to that it attaches.
+
+    Returns:
+        How many elements it comes to.
+    """
+    total, waiting = sum(attached), [(root, 0, 1.0)]
     while waiting:
         element, depth, copies = waiting.pop()
         if element.tag in _COPYING:
             copies *= _product(element.get("count", ""))
+        if element.tag == "attach":
+            # Without a model it copies a body of the document, which may hold copies itself.
+            total += copies * (max(attached, default=0.0) if element.get(MODEL) else total)
         total += copies
         if total > MOST_ELEMENTS:
             raise ModelError(
@@ -165,8 +317,10 @@ def _check_amounts(root: ElementTree.Element, name: str) -> None:
         if depth > DEEPEST:
             raise ModelError(f"{name} nests its elements more than {DEEPEST} levels deep")
         _check_numbers(element, name)
+        _check_iterations(element, name)
         _check_muscles(element, name)
-        waiting.extend((child, depth + 1, copies) for child in element)
+        waiting.extend((child, depth + 1, copies) for child in reversed(element))
+    return total
 
 
 def _check_numbers(element: ElementTree.Element, name: str) -> None:
@@ -178,6 +332,16 @@ def _check_numbers(element: ElementTree.Element, name: str) -> None:
             raise ModelError(
                 f"{name} asks for too much: {' x '.join(attributes)} of <{element.tag}> is "
                 f"{' x '.join(value[:20] for value in values)}; no more than {limit} is allowed"
+            )
+
+
+def _check_iterations(element: ElementTree.Element, name: str) -> None:
+    for attribute in _ITERATIONS if element.tag == "option" else ():
+        value = element.get(attribute, "")
+        if _product(value) > MOST_ITERATIONS:
+            raise ModelError(
+                f"{name} asks for {value[:20]} {attribute} in each step; no more than "
+                f"{MOST_ITERATIONS} are done"
             )
 
 
