@@ -144,6 +144,20 @@ def test_ten_edits_good_and_broken(file, watch):
     assert stderr == "no longer watching mine.xml\n"
 
 
+def test_a_file_that_is_written_in_pieces_is_one_save(file, watch):
+    """Each piece is a broken file."""
+    watcher = watch(episodes=20)
+    watcher.until("done")
+    pieces = [LIGHT[start : start + 2500] for start in range(0, len(LIGHT), 2500)]
+    with file.open("w", encoding="utf-8") as target:
+        for piece in pieces:
+            target.write(piece)
+            target.flush()
+            time.sleep(0.2)
+    assert not any("error" in line for line in watcher.until("done"))
+    assert watcher.end()[0] == 130
+
+
 @pytest.mark.slow
 def test_from_a_save_to_a_new_video(file, watch):
     watcher = watch(episodes=1500, video=True)

@@ -31,6 +31,8 @@ POLL: Final = 0.2
 """Seconds between two looks at the file."""
 SETTLE: Final = 0.05
 """Seconds that a file must stay as it is: some editors empty it before they write it."""
+PIECES: Final = 0.4
+"""Seconds after which a broken file is taken for whole: some programs write in pieces."""
 RUNGS: Final = (2, 3, 4)
 """Of the ladder: those that take no time."""
 LEAN: Final = 0.1
@@ -82,6 +84,15 @@ class Watched:
             before = mark
             time.sleep(SETTLE)
         return mark != self._seen and self.is_there()
+
+    def goes_on(self) -> bool:
+        """Whether more of the file is written in a moment."""
+        until = time.monotonic() + PIECES
+        while self._mark() == self._seen:
+            if time.monotonic() > until:
+                return False
+            time.sleep(SETTLE)
+        return True
 
     def check(self) -> None:
         """Raise `_SavedAgainError` if it has changed; it looks only now and then."""
@@ -190,6 +201,9 @@ def _watch(watched: Watched, recipe: Recipe, once: int | None) -> None:
             watched.take()
             continue
         except MjCartPoleError as error:
+            if watched.goes_on():
+                watched.take()
+                continue
             _say("error", f"{error}")
             _say("waiting", "for the next save")
         done += 1
