@@ -3,6 +3,7 @@
 import os
 import re
 import select
+import shutil
 import signal
 import subprocess
 import sys
@@ -178,7 +179,9 @@ def test_a_run_can_be_filmed_elsewhere(runs, here, capsys):
 
 
 def test_a_policy_file_alone_is_enough(runs, capsys):
-    assert "videos/policy.mp4" in render([runs / "mujoco" / "policy.json"], capsys)
+    assert "videos/mujoco.mp4" in render([runs / "mujoco" / "policy.json"], capsys)
+    copy = shutil.copy(runs / "mujoco" / "policy.json", runs / "mine.json")
+    assert "videos/mine.mp4" in render([copy], capsys)
 
 
 def test_the_fall_is_shown_four_times_slower(runs, capsys):

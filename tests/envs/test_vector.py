@@ -1,9 +1,11 @@
 """The vector of environments, against single ones and against gymnasium's own vector."""
 
 import doctest
+import gc
 import os
 import subprocess
 import sys
+import weakref
 
 import gymnasium
 import numpy as np
@@ -476,3 +478,22 @@ def test_no_opengl_is_needed_whatever_the_environment_asks_for():
         check=False,
     )
     assert (done.stdout, done.stderr) == ("[1.0, 1.0]\n", "")
+
+
+@pytest.mark.parametrize("model", ["cartpole", "twopoles"])
+@pytest.mark.parametrize("make", [CartPoleEnv, CartPoleVectorEnv])
+def test_an_environment_that_nobody_holds_is_gone_at_once(make, model):
+    """Found later by the garbage collector, in a forked process, MuJoCo would wait for its threads.
+
+    They are not there, since a fork has none.
+    """
+    env = make(model=model)
+    env.reset(seed=0)
+    env.step([1] if make is CartPoleVectorEnv else 1)
+    gone = weakref.ref(env)
+    gc.disable()
+    try:
+        del env
+        assert gone() is None
+    finally:
+        gc.enable()

@@ -42,7 +42,9 @@ def bases() -> list[str]:
     """Whole documents to be damaged."""
     from mjcartpole.physics.model import load_model
 
-    sources = ["cartpole", *sorted((Path(__file__).parent / "models").glob("*.xml"))]
+    tests = Path(__file__).parents[1]
+    files = [*(tests / "physics" / "models").glob("*.xml"), *(tests / "models").glob("*.xml")]
+    sources = ["cartpole", "twopoles", *sorted(files)]
     for package, file in FOREIGN:
         spec = importlib.util.find_spec(package)
         sources += [Path(spec.origin).parent / file] if spec is not None else []

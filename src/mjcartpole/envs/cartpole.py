@@ -181,7 +181,9 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int]):
         observation = np.zeros(4, dtype=np.float32)
         # A view that takes single floats several times faster than the array does.
         self._cells: memoryview[float] = observation.data.cast("B").cast("f")
-        self._new_observation = observation.copy if poles == 1 else self._observe_poles
+        self._new_observation = (
+            observation.copy if poles == 1 else functools.partial(_observe, self.simulation)
+        )
         picture = {"width": width, "height": height, "camera": camera}
         if render_mode == "rgb_array" or picture != _DEFAULT_PICTURE:
             check_picture(self.simulation.cartpole, width, height, camera)
@@ -247,10 +249,6 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int]):
         cells[2] = theta
         cells[3] = theta_dot
         return new_observation(), reward, terminated, False, {}
-
-    def _observe_poles(self) -> npt.NDArray[np.float32]:
-        """The observation of several poles, read from the simulation."""
-        return self.simulation.state.astype(np.float32)
 
     def _end(self) -> float:
         """Reward of a step that ends the episode, or comes after its end."""
@@ -332,6 +330,11 @@ def _check_render_mode(render_mode: str | None, width: int, height: int) -> None
             f"a window has the size that the screen gives it, not {width}x{height}; "
             'width and height are for render_mode="rgb_array"'
         )
+
+
+def _observe(simulation: Simulation) -> npt.NDArray[np.float32]:
+    """The observation, also of several poles."""
+    return simulation.state.astype(np.float32)
 
 
 def _as_one_pole(step: Callable[[float], State]) -> Callable[[float], State]:

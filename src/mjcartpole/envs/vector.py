@@ -163,7 +163,7 @@ class CartPoleVectorEnv(
         cartpole = self.cartpole
         model = stepping_model(cartpole.model, integrator)
         self._batch = batch = Batch(model, self.num_envs, threads, _needs_own_data(model))
-        self._advance = self._explicit_euler if integrator == "gym" else self._own_integrator
+        self._explicit = integrator == "gym"
         self._timestep = cartpole.timestep
         self._fresh = batch.state[0].copy()
         qpos, qvel = batch.bind("qpos"), batch.bind("qvel")
@@ -260,7 +260,10 @@ class CartPoleVectorEnv(
         if not self._has_state:
             raise ResetNeededError("Call reset before using step method.")
         self._control[...] = controls
-        self._advance()
+        if self._explicit:
+            self._explicit_euler()
+        else:
+            self._own_integrator()
         self._clock += 1
         restarted = self._ended
         if restarted.size:
