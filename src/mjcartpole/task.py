@@ -45,6 +45,11 @@ def state_names(poles: int = 1) -> tuple[str, ...]:
     return ("x", "x_dot", *names)
 
 
+def in_words(poles: int) -> str:
+    """A number of poles, for messages."""
+    return "1 pole" if poles == 1 else f"{poles} poles"
+
+
 def observation_bound(poles: int = 1) -> npt.NDArray[np.float32]:
     """Upper bound of the observation, shape (2 + 2 poles,); the lower bound is its negative.
 

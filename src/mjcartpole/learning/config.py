@@ -173,10 +173,9 @@ class TrainConfig:
         for name in _GRID:
             n = len(getattr(self, name))
             if n not in (_DIMENSIONS, wanted):
-                poled = "1 pole" if poles == 1 else f"{poles} poles"
                 also = f" or {wanted}" if wanted != _DIMENSIONS else ""
                 raise ConfigError(
-                    f"{name} has {n} values, and the model has {poled}; "
+                    f"{name} has {n} values, and the model has {task.in_words(poles)}; "
                     f"give {_DIMENSIONS}{also} ({', '.join(task.state_names(poles))})"
                 )
         bins, low, high = (_for_each_pole(getattr(self, name), poles) for name in _GRID)

@@ -18,7 +18,7 @@ import numpy.typing as npt
 from mjcartpole.errors import ConfigError, PolicyFileError
 from mjcartpole.files import write_whole
 from mjcartpole.learning.discretizer import Discretizer
-from mjcartpole.task import N_ACTIONS
+from mjcartpole.task import N_ACTIONS, in_words
 
 FORMAT = "mjcartpole-policy"
 VERSION = 1
@@ -75,7 +75,7 @@ class Policy:
         """
         if self.poles != poles:
             raise ConfigError(
-                f"the policy is for {_poles(self.poles)}, and {where} has {_poles(poles)}; "
+                f"the policy is for {in_words(self.poles)}, and {where} has {in_words(poles)}; "
                 "train one there"
             )
 
@@ -109,10 +109,6 @@ class Policy:
                 "restore it from a copy, or train again"
             )
         return policy
-
-
-def _poles(n: int) -> str:
-    return "1 pole" if n == 1 else f"{n} poles"
 
 
 def _to_text(policy: Policy) -> str:

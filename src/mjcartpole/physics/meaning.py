@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
+from mjcartpole import task
 from mjcartpole.errors import ConfigError
 from mjcartpole.physics.addresses import find_element
 from mjcartpole.physics.bodies import cart_bodies, mass_of
@@ -139,9 +140,9 @@ def _sort_by_pole(
         if poles > 1:
             names = [plain.replace(".", f"{pole + 1}.", 1) for pole in range(poles)]
         if key not in names:
-            has = "1 pole" if poles == 1 else f"{poles} poles"
             raise ConfigError(
-                f"{key!r} names no pole of the model, it has {has}; use {' or '.join(names)}"
+                f"{key!r} names no pole of the model, it has {task.in_words(poles)}; "
+                f"use {' or '.join(names)}"
             )
         by_pole[names.index(key)][plain] = value
     return whole, by_pole

@@ -12,6 +12,7 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
+from mjcartpole import task
 from mjcartpole.errors import ModelError, NotACartPoleError
 from mjcartpole.physics.bodies import cart_bodies, mass_of, pole_bodies
 from mjcartpole.physics.equations import Parameters
@@ -68,7 +69,7 @@ def read_parameters(cartpole: CartPole) -> Parameters:
 
 def several_poles(cartpole: CartPole) -> str:
     """Why the equations do not cover a model with several poles."""
-    return f"{cartpole.poles} poles, and the equations are those of one"
+    return f"{task.in_words(cartpole.poles)}, and the equations are those of one"
 
 
 def differences(p: Parameters, q: Parameters, rtol: float = 1e-12) -> list[str]:
