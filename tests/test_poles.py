@@ -316,6 +316,7 @@ def test_a_run_is_stored_continued_evaluated_and_filmed(tmp_path, monkeypatch, c
         ("train --model twopoles --bins 1 3 6 8 6", "two more for each further pole"),
         ("train --bins 1 3 6 8 6 8", "bins has 6 values, and the model has 1 pole"),
         ("train --model twopoles --set pole.length=1", "use pole1.length or pole2.length"),
+        ("train --model twopoles --set pole2.lenght=1", "did you mean 'pole2.length'?"),
         ("train --model twopoles --set pole3.mass=1", "use pole1.mass or pole2.mass"),
         ("train --set hinge1.damping=1", "it has 1 pole; use hinge.damping"),
         ("parity --model twopoles --against itself", "2 poles, and the equations are those of one"),

@@ -18,7 +18,7 @@ from mjcartpole.physics.addresses import find_element, known_attributes, label_o
 from mjcartpole.physics.beyond import beyond_equations, beyond_step
 from mjcartpole.physics.document import Document, Element
 from mjcartpole.physics.equations import CARTPOLE_V1, Parameters
-from mjcartpole.physics.meaning import MEANINGS, apply_meanings, meaning_of
+from mjcartpole.physics.meaning import MEANINGS, apply_meanings, meaning_of, names_like
 from mjcartpole.physics.model import CartPole
 from mjcartpole.physics.parameters import differences, read_parameters
 from mjcartpole.physics.parts import number_text
@@ -88,7 +88,9 @@ def check_key(key: str) -> None:
         return
     tag = re.split(r"[.:]", key, maxsplit=1)[0]
     if tag not in schema_tags():
-        hint = did_you_mean(tag, schema_tags()) if ":" in key else did_you_mean(key, EDIT_NAMES)
+        hint = (
+            did_you_mean(tag, schema_tags()) if ":" in key else did_you_mean(key, names_like(key))
+        )
         raise ConfigError(f"nothing to edit is called {key!r}: {hint}")
     selector, _, attribute = key.rpartition(".")
     if not selector or not attribute:

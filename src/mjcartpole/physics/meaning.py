@@ -90,6 +90,16 @@ def meaning_of(key: str) -> Meaning | None:
     return MEANINGS.get(_NUMBERED.sub(r"\1.", key))
 
 
+def names_like(key: str) -> list[str]:
+    """What can be named, with the pole's number where a key has one."""
+    numbered = _NUMBERED.match(key)
+    number = numbered[2] if numbered else ""
+    return [
+        name.replace(".", f"{number}.", 1) if name.startswith(_OF_POLE) else name
+        for name in MEANINGS
+    ]
+
+
 def apply_meanings(document: Document, values: Mapping[str, float], name: str) -> None:
     """Make edits by meaning in a document.
 
