@@ -64,8 +64,7 @@ def set_stage(source: Path, choice: Choice) -> Stage:
         # Gymnasium's cart-pole has neither; only what the user asks for is held against that.
         integrator, model, own_timestep = "gym", "cartpole", False
     model, integrator = choice.model or model, choice.integrator or integrator
-    own = ("own-timestep",) if choice.own_timestep else ()
-    check_backend(backend, model, integrator, (*choice.set, *own))
+    check_backend(backend, model, integrator, choice.set, own_timestep=choice.own_timestep)
     own_timestep = own_timestep or choice.own_timestep
     played_on: ModelLike = model
     if choice.set or own_timestep:

@@ -34,6 +34,11 @@ N_ACTIONS: Final = 2
 """0 pushes to the left (-x), 1 to the right (+x)."""
 
 
+def frame_rate(control_step: float = CONTROL_STEP) -> int:
+    """Frames per second of a film with one frame per control step of so many seconds."""
+    return max(1, round(1 / control_step))
+
+
 def state_names(poles: int = 1) -> tuple[str, ...]:
     """What the values of a state are: m, m/s, then rad and rad/s of each pole.
 

@@ -18,7 +18,12 @@ GYM_ID = "CartPole-v1"
 
 
 def check_backend(
-    backend: str, model: object, integrator: str, edits: Collection[str] = ()
+    backend: str,
+    model: object,
+    integrator: str,
+    edits: Collection[str] = (),
+    *,
+    own_timestep: bool = False,
 ) -> None:
     """Refuse a backend that does not exist, or settings that it would ignore.
 
@@ -30,8 +35,9 @@ def check_backend(
             f"backend '{backend}' is unknown; available: {', '.join(get_args(Backend))}"
         )
     check_integrator(integrator)
-    if backend == "gym" and ((model, integrator) != ("cartpole", "gym") or edits):
-        asked = ", ".join(f"'{word}'" for word in (model, integrator, *edits))
+    others = (*edits, *(("own-timestep",) if own_timestep else ()))
+    if backend == "gym" and ((model, integrator) != ("cartpole", "gym") or others):
+        asked = ", ".join(f"'{word}'" for word in (model, integrator, *others))
         raise ConfigError(
             f"backend 'gym' is gymnasium's {GYM_ID} as it is: it takes no model, integrator, "
             f"timestep or edits (asked for {asked}); use backend 'mujoco' for these"

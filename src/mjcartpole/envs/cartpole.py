@@ -137,7 +137,7 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int]):
 
     metadata: dict[str, Any] = {  # noqa: RUF012 - gymnasium's own declaration
         "render_modes": ["human", "rgb_array"],
-        "render_fps": round(1 / task.CONTROL_STEP),
+        "render_fps": task.frame_rate(),
     }
 
     def __init__(
@@ -164,7 +164,7 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int]):
         _check_render_mode(render_mode, width, height)
         cartpole = load_model(model, edits, own_timestep=own_timestep)
         self.simulation, poles = Simulation(cartpole, integrator), cartpole.poles
-        self.metadata = {**self.metadata, "render_fps": max(1, round(1 / cartpole.control_step))}
+        self.metadata = self.metadata | {"render_fps": task.frame_rate(cartpole.control_step)}
         bound = task.observation_bound(poles)
         self.observation_space = spaces.Box(-bound, bound, dtype=np.float32)
         self.action_space = spaces.Discrete(task.N_ACTIONS)

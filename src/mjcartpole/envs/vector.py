@@ -106,7 +106,7 @@ class CartPoleVectorEnv(
 
     metadata: dict[str, Any] = {  # noqa: RUF012 - gymnasium's own declaration
         "render_modes": list(get_args(VectorRenderMode)),
-        "render_fps": round(1 / task.CONTROL_STEP),
+        "render_fps": task.frame_rate(),
         "autoreset_mode": AutoresetMode.NEXT_STEP,
     }
 
@@ -142,9 +142,7 @@ class CartPoleVectorEnv(
         self.cartpole = load_model(model, edits, own_timestep=own_timestep)
         if render_mode is not None or (width, height, camera) != _DEFAULT_PICTURE:
             check_picture(self.cartpole, width, height, camera)
-        self.metadata = self.metadata | {
-            "render_fps": max(1, round(1 / self.cartpole.control_step))
-        }
+        self.metadata = self.metadata | {"render_fps": task.frame_rate(self.cartpole.control_step)}
         bound = task.observation_bound(self.cartpole.poles)
         self.single_observation_space = spaces.Box(-bound, bound, dtype=np.float32)
         self.single_action_space = spaces.Discrete(task.N_ACTIONS)

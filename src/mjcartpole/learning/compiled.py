@@ -65,14 +65,14 @@ class CompiledLoop:
             Simulation(load_model(model), integrator) if backend == "mujoco" else None
         )
         self._physics = _physics(self._simulation)
-        self._poles = self._simulation.cartpole.poles if self._simulation else 1
+        size = self._simulation.size if self._simulation else len(task.state_names())
         self._chunk = _control_steps(self._simulation)
         limit = task.TIME_LIMIT
         self._scratch = kernels.Scratch(
             states=np.zeros(limit + 1, np.int64),
             actions=np.zeros(limit, np.int64),
             rewards=np.zeros(limit, np.float64),
-            failure=np.full(3 + 2 * self._poles, -1.0),
+            failure=np.full(1 + size, -1.0),
             finished=np.zeros(1, np.int64),
         )
 

@@ -119,8 +119,9 @@ class TrainConfig:
     def __post_init__(self) -> None:
         for name in (*_GRID, "set"):
             object.__setattr__(self, name, tuple(getattr(self, name)))
-        own = ("own-timestep",) if self.own_timestep else ()
-        check_backend(self.backend, self.model, self.integrator, (*self.set, *own))
+        check_backend(
+            self.backend, self.model, self.integrator, self.set, own_timestep=self.own_timestep
+        )
         self._check_counts()
         self._check_numbers()
         self._check_dimensions()

@@ -161,14 +161,14 @@ class Scene:
 
     def cart_box(self) -> Box | None:
         """The part of the picture that holds the cart; None if it is behind the camera."""
-        body = self.model.jnt_bodyid[self.model.jnt_qposadr == self.cartpole.slider][0]
+        body = self.model.jnt_bodyid[self.cartpole.slider]
         geoms = np.flatnonzero(self.model.geom_bodyid == body)
         points = self._corners(geoms).reshape(-1, 3) if len(geoms) else self._data.xpos[[body]]
         return self._bounds(points, margin=0)
 
     def push_direction(self) -> Points:
         """Where a push along the slider's positive axis points to in the picture, shape (2,)."""
-        joint = int(np.flatnonzero(self.model.jnt_qposadr == self.cartpole.slider)[0])
+        joint = self.cartpole.slider
         start = self._data.xanchor[joint]
         pixels, _ = self.view.project(np.array([start, start + 0.1 * self._data.xaxis[joint]]))
         direction: Points = pixels[1] - pixels[0]

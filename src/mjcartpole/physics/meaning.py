@@ -69,7 +69,7 @@ MEANINGS: Final = {
     "rail.friction": Meaning("N", "dry friction of the rail"),
     "rail.armature": Meaning("kg", "inertia of the rail's own drive, without weight"),
 }
-"""In the order in which they are made."""
+"""By name; of several poles, one has its number in it, as pole2.length."""
 
 _OF_POLE: Final = ("pole.", "hinge.")
 _NUMBERED: Final = re.compile(r"^(pole|hinge)([1-9]\d*)\.")
@@ -93,11 +93,11 @@ def meaning_of(key: str) -> Meaning | None:
 def names_like(key: str) -> list[str]:
     """What can be named, with the pole's number where a key has one."""
     numbered = _NUMBERED.match(key)
-    number = numbered[2] if numbered else ""
-    return [
-        name.replace(".", f"{number}.", 1) if name.startswith(_OF_POLE) else name
-        for name in MEANINGS
-    ]
+    return [_with_number(name, numbered[2]) if numbered else name for name in MEANINGS]
+
+
+def _with_number(name: str, number: object) -> str:
+    return name.replace(".", f"{number}.", 1) if name.startswith(_OF_POLE) else name
 
 
 def apply_meanings(document: Document, values: Mapping[str, float], name: str) -> None:
@@ -141,14 +141,13 @@ def _sort_by_pole(
     whole: dict[str, float] = {}
     by_pole: list[dict[str, float]] = [{} for _ in range(poles)]
     for key, value in values.items():
-        numbered = _NUMBERED.match(key)
         plain = _NUMBERED.sub(r"\1.", key)
-        if numbered is None and not plain.startswith(_OF_POLE):
+        if not plain.startswith(_OF_POLE):
             whole[key] = value
             continue
         names = [plain]
         if poles > 1:
-            names = [plain.replace(".", f"{pole + 1}.", 1) for pole in range(poles)]
+            names = [_with_number(plain, pole + 1) for pole in range(poles)]
         if key not in names:
             raise ConfigError(
                 f"{key!r} names no pole of the model, it has {task.in_words(poles)}; "

@@ -138,8 +138,7 @@ def load_model(
     if isinstance(source, mujoco.MjSpec):
         return _find_parts(*_from_spec(source), own_timestep)
     if isinstance(source, str) and source.lstrip().startswith("<"):
-        name = "the XML document"
-        return _find_parts(name, *_from_text(source, name), own_timestep)
+        return load_named(source, "the XML document", own_timestep=own_timestep)
     path = find_model(source)
     name = path.stem if path.parent == models_folder() else str(source)
     return _find_parts(name, *_from_file(path), own_timestep)
@@ -157,17 +156,16 @@ def _load_edited(
     changes = edits_of(edits)
     document = edit_document(base.xml, changes, base.name)
     what = ", ".join(f"{key}={value}" for key, value in changes.items())
-    name = f"{base.name} with {what}"
-    return _find_parts(name, *_from_text(document, name), own_timestep)
+    return load_named(document, f"{base.name} with {what}", own_timestep=own_timestep)
 
 
-def load_named(document: str, name: str) -> CartPole:
-    """Load a document that a person knows by a name; its timestep may be any.
+def load_named(document: str, name: str, *, own_timestep: bool = True) -> CartPole:
+    """Load a document that a person knows by a name.
 
     Raises:
         ModelError: It does not load, or is no cart-pole.
     """
-    return _find_parts(name, *_from_text(document, name), own_timestep=True)
+    return _find_parts(name, *_from_text(document, name), own_timestep)
 
 
 def with_options(

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from mjcartpole import task
 from mjcartpole.errors import NotACartPoleError
-from mjcartpole.physics.bodies import HasJoints, mass_of, pole_bodies
+from mjcartpole.physics.bodies import HasJoints, mass_of, pole_bodies, subtree
 
 Vector = npt.NDArray[np.float64]
 
@@ -89,17 +89,12 @@ def find_joints(name: str, model: mujoco.MjModel) -> tuple[int, tuple[int, ...]]
         raise refusal(name, model, f"{amount} where one (the cart's) is needed")
     if not hinges:
         raise refusal(name, model, "no hinge joint where one (the pole's) is needed")
+    sliding = subtree(model, int(model.jnt_bodyid[sliders[0]]))
     for hinge in hinges:
-        if not _is_below(model, model.jnt_bodyid[hinge], model.jnt_bodyid[sliders[0]]):
+        if model.jnt_bodyid[hinge] not in sliding:
             which = f" ('{model.joint(hinge).name or hinge}')" if len(hinges) > 1 else ""
             raise refusal(name, model, f"a hinge{which} whose body is not inside the cart's body")
     return sliders[0], tuple(hinges)
-
-
-def _is_below(model: mujoco.MjModel, body: int, ancestor: int) -> bool:
-    while body not in (0, ancestor):
-        body = model.body_parentid[body]
-    return bool(body == ancestor)
 
 
 def find_controls(name: str, model: mujoco.MjModel, slider: int) -> tuple[float, float]:

@@ -5,6 +5,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 
+from mjcartpole import task
 from mjcartpole.envs.backend import GYM_ID
 from mjcartpole.envs.registration import ENV_ID
 from mjcartpole.studies.parity.result import Figure, Result
@@ -40,7 +41,7 @@ def _declarations(
     ours: gymnasium.Env[Any, Any], gyms: gymnasium.Env[Any, Any], timestep: float
 ) -> list[str]:
     # Gymnasium's declaration stays what it is, whatever `tau` it is given.
-    metadata = {**gyms.metadata, "render_fps": max(1, round(1 / timestep))}
+    metadata = {**gyms.metadata, "render_fps": task.frame_rate(timestep)}
     pairs = {
         "observation_space": (ours.observation_space, gyms.observation_space),
         "action_space": (ours.action_space, gyms.action_space),
