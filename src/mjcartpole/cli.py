@@ -112,6 +112,7 @@ def _parity(command: Parity) -> int:
         against=command.against,
         rungs=command.rungs,
         quick=command.quick,
+        strict=command.strict,
         output=command.json,
     )
 

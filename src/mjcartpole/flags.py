@@ -122,6 +122,8 @@ class Parity:
     """Which rungs of the ladder."""
     quick: bool = False
     """Fewer samples."""
+    strict: bool = False
+    """Exit with 1 also where the motion holds and the model's numbers are not CartPole-v1's."""
     json: Path | None = None
     """Write every figure to this file."""
 

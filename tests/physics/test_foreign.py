@@ -114,7 +114,7 @@ def test_dm_controls_cart_pole_is_understood():
     assert (found.rail, found.up, pole.leans, found.integrator) == ("+x", "+z", 1, "RK4")
     assert (found.cart_mass, pole.mass, pole.com_distance) == pytest.approx((1, 0.1, 0.5))
     assert found.rail_limits == (-1.8, 1.8)
-    assert found.beyond == ("limit of joint 'slider' at -1.8 and 1.8",)
+    assert found.beyond == ()
 
 
 def test_gymnasiums_inverted_pendulum_is_understood():

@@ -242,7 +242,8 @@ def test_comments_as_people_write_them_are_taken():
 
 
 def test_integrators_are_numbered_as_in_mujoco():
-    for number, name in enumerate(INTEGRATORS):
+    assert len(INTEGRATORS) == len(mujoco.mjtIntegrator.__members__)
+    for number, name in INTEGRATORS.items():
         assert mujoco.mjtIntegrator(number).name == f"mjINT_{name.upper()}"
         cartpole = load_model(changed('integrator="Euler"', f'integrator="{name}"'))
         assert cartpole.integrator == name

@@ -28,10 +28,16 @@ from mjcartpole.physics.structure import (
     find_controls,
     find_joints,
     find_substeps,
+    motor_of,
 )
 
-INTEGRATORS = ("Euler", "RK4", "implicit", "implicitfast")
-"""As MJCF spells them, in the order of MuJoCo's mjtIntegrator."""
+INTEGRATORS = {
+    int(value): {"EULER": "Euler", "RK4": "RK4"}.get(
+        name := key.removeprefix("mjINT_"), name.lower()
+    )
+    for key, value in mujoco.mjtIntegrator.__members__.items()
+}
+"""MuJoCo's integrators by its own numbers, spelled as MJCF spells them."""
 
 
 @dataclass(frozen=True)
@@ -70,6 +76,11 @@ class CartPole:
         return (self.slider, *self.hinges)
 
     @property
+    def motor(self) -> int:
+        """Index of the actuator that the actions control."""
+        return motor_of(self.model)
+
+    @property
     def timestep(self) -> float:
         """Seconds of one physics step."""
         return float(self.model.opt.timestep)
@@ -82,7 +93,7 @@ class CartPole:
     @property
     def integrator(self) -> str:
         """The integrator that the file names, as MJCF spells it (see `INTEGRATORS`)."""
-        return INTEGRATORS[int(self.model.opt.integrator)]
+        return str(INTEGRATORS[int(self.model.opt.integrator)])
 
 
 ModelLike: TypeAlias = str | os.PathLike[str] | mujoco.MjSpec | CartPole
@@ -179,13 +190,13 @@ def with_options(
     Args:
         cartpole: The cart-pole.
         timestep: Seconds.
-        integrator: As MJCF spells it: Euler, RK4, implicit or implicitfast.
+        integrator: As MJCF spells it (see `INTEGRATORS`).
     """
     model = copy.copy(cartpole.model)
     if timestep is not None:
         model.opt.timestep = timestep
     if integrator is not None:
-        model.opt.integrator = INTEGRATORS.index(integrator)
+        model.opt.integrator = next(n for n, name in INTEGRATORS.items() if name == integrator)
     return dataclasses.replace(cartpole, model=model, substeps=1)
 
 

@@ -138,7 +138,7 @@ def stepping_model(model: mujoco.MjModel, integrator: Integrator) -> mujoco.MjMo
     disable = mujoco.mjtDisableBit
     stepped = copy.copy(model)
     stepped.opt.disableflags |= int(disable.mjDSBL_AUTORESET)
-    if _nothing_can_touch(model):
+    if nothing_can_touch(model):
         stepped.opt.disableflags |= int(disable.mjDSBL_CONTACT)
         if _nothing_else_constrains(model):
             stepped.opt.disableflags |= int(disable.mjDSBL_CONSTRAINT)
@@ -149,7 +149,7 @@ def stepping_model(model: mujoco.MjModel, integrator: Integrator) -> mujoco.MjMo
     return stepped
 
 
-def _nothing_can_touch(model: mujoco.MjModel) -> bool:
+def nothing_can_touch(model: mujoco.MjModel) -> bool:
     """Whether no two geoms of a model can ever be in contact, wherever they are."""
     pairs = np.bitwise_and.outer(model.geom_contype, model.geom_conaffinity)
     return not (pairs.any() or model.npair or model.nflex)
