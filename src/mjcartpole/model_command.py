@@ -9,6 +9,7 @@ from mjcartpole.files import write_whole
 from mjcartpole.physics.describe import describe
 from mjcartpole.physics.edit import EDIT_NAMES, describe_edits, differs_from
 from mjcartpole.physics.model import find_model, load_model, model_names, models_folder
+from mjcartpole.physics.playable import why_unplayable
 from mjcartpole.physics.simulation import silence_mujoco
 
 _COMMENT = re.compile(r"<!--(.*?)-->", re.DOTALL)
@@ -41,6 +42,9 @@ def run_show(name: str, edits: Sequence[str], own_timestep: bool = False) -> int
     print("\ndiffers from CartPole-v1:" if different else "\nmoves as CartPole-v1 does")
     for phrase in different:
         print(f"  {phrase}")
+    why = why_unplayable(cartpole)
+    if why:
+        print(f"\n{why}")
     return 0
 
 
