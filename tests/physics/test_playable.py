@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from mjcartpole import task
+from mjcartpole.physics import playable
 from mjcartpole.physics.model import load_model, model_names, models_folder
 from mjcartpole.physics.playable import why_unplayable
 from mjcartpole.physics.simulation import Simulation
@@ -99,3 +100,12 @@ def lasted(simulation, start, actions) -> int:
         if task.has_terminated(state[0], task.farthest(state[2::2])):
             return done
     return len(actions) + 1
+
+
+@pytest.mark.parametrize("edits", [{"timestep": 2e-5, "force": 0.1}, {"timestep": 2e-5}, {}])
+def test_the_work_is_bounded_however_many_substeps_a_model_asks_for(edits):
+    cartpole = load_model("cartpole", {**edits, "option.integrator": "RK4"})
+    search = playable._Search(Simulation(cartpole, "mujoco"))
+    search.lost(np.random.default_rng(0).uniform(-0.05, 0.05, (8, 4)).tolist())
+    # It looks at the sum between control steps, of one action or both.
+    assert 0 < search.steps <= playable.MOST_STEPS + 2 * 4 * cartpole.substeps
