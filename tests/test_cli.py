@@ -307,6 +307,17 @@ def test_a_run_at_the_files_own_timestep_is_evaluated_as_it_was_trained(here, ca
     assert (code, "asked for" in error) == (2, True)
 
 
+def test_it_is_said_where_no_policy_can_balance_a_model(here, capsys):
+    train = ["train", "--engine", "python", "--episodes", "3", "--no-video"]
+    words = "no policy can balance this: from 8 of 8 starts every sequence of actions ends"
+    for edits, expected in ((["--set", "force=1000"], 1), ([], 0)):
+        code, out, _ = call(["model", "show", "cartpole", *edits], capsys)
+        assert (code, out.count(words)) == (0, expected)
+        code, _, error = call([*train, *edits], capsys)
+        assert (code, error.count(words), len(error.splitlines())) == (0, expected, expected)
+    assert call([*train, "--backend", "gym"], capsys)[2] == ""
+
+
 def test_the_word_after_set_is_an_edit_even_where_it_is_none(here, capsys):
     code, _, error = call(["model", "show", "cartpole", "--set", "pole.length"], capsys)
     assert code == 2

@@ -10,6 +10,7 @@ from mjcartpole.physics.beyond import differs_from, idle_numbers
 from mjcartpole.physics.describe import describe
 from mjcartpole.physics.edit import EDIT_NAMES, describe_edits
 from mjcartpole.physics.model import find_model, load_model, model_names, models_folder
+from mjcartpole.physics.playable import why_unplayable
 from mjcartpole.physics.simulation import silence_mujoco
 
 _COMMENT = re.compile(r"<!--(.*?)-->", re.DOTALL)
@@ -47,6 +48,9 @@ def run_show(name: str, edits: Sequence[str], own_timestep: bool = False) -> int
         print("what no episode feels:")
     for phrase in idle:
         print(f"  {phrase}")
+    why = why_unplayable(cartpole)
+    if why:
+        print(f"\n{why}")
     return 0
 
 

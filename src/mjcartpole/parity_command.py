@@ -52,7 +52,7 @@ def run_parity(
     print(QUESTIONS[against].format(cartpole.name) + (" (quick)" if quick else ""))
     if subject.region.bounds:
         print(f"  asked where it moves freely; outside: {'; '.join(subject.region.bounds)}")
-    if subject.own.slider_friction or subject.own.hinge_friction:
+    if subject.solves_to_the_end:
         print("  dry friction is solved to the end, not to the file's solver tolerance")
     results: list[Result] = []
     console, ladder = Console(stderr=True), run_ladder(subject, rungs)

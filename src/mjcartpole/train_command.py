@@ -27,6 +27,7 @@ from mjcartpole.learning.folders import free_folder, locked_folder
 from mjcartpole.learning.session import CHECKPOINT_EVERY, Session, check_interval
 from mjcartpole.learning.training import Training, TrainResult
 from mjcartpole.physics.model import CartPole
+from mjcartpole.physics.playable import why_unplayable
 from mjcartpole.physics.simulation import silence_mujoco
 from mjcartpole.render_command import film
 from mjcartpole.signals import Interrupted, StopSignals
@@ -166,6 +167,9 @@ def _prepare(config: TrainConfig, how: How) -> CartPole:
     cartpole = config.load_model()
     config.discretizer(cartpole.poles)
     runs.check_storable(cartpole)
+    why = why_unplayable(cartpole, config.integrator) if config.backend == "mujoco" else None
+    if why:
+        print(f"mjcartpole: {why}", file=sys.stderr)
     return cartpole
 
 

@@ -19,6 +19,7 @@ from mjcartpole.learning.training import train
 from mjcartpole.media.renderer import open_renderer
 from mjcartpole.physics.describe import describe
 from mjcartpole.physics.model import load_model, models_folder, same_model
+from mjcartpole.physics.playable import why_unplayable
 from mjcartpole.physics.simulation import Simulation
 
 OURS = sorted((Path(__file__).parent / "models").glob("*.xml"))
@@ -73,6 +74,13 @@ def test_it_plays_episodes_and_falls_when_left_alone(path, integrator):
             steps += 1
         lengths.append(steps)
     assert all(5 < length < 500 for length in lengths)
+
+
+@pytest.mark.parametrize("integrator", ["gym", "mujoco"])
+@pytest.mark.parametrize("path", EVERY, ids=lambda path: path.stem)
+def test_a_policy_may_balance_it(path, integrator):
+    needs(path)
+    assert why_unplayable(load_model(path), integrator) is None
 
 
 @pytest.mark.parametrize("path", EVERY, ids=lambda path: path.stem)

@@ -88,7 +88,7 @@ def _axes(cartpole: CartPole, own: Parameters, reference: Parameters) -> Iterato
     ref = float(cartpole.model.qpos0[cartpole.hinges[0]])
     phrases = {
         "hinge_sign": f"hinge axis of {hinge} turned round: a positive angle leans to "
-        f"{'+' if own.hinge_sign > 0 else '-'}x",
+        f"{'+' if own.hinge_sign > 0 else '-'}x{_upside_down(cartpole)}",
         "rail_tilt": f"slide axis of {slider} tilted by {_degrees(own.rail_tilt)}",
         "hinge_tilt": f"hinge axis of {hinge} tilted by {_degrees(own.hinge_tilt)}",
         "skew": f"slide axis of {slider} and hinge axis of {hinge} out of square by "
@@ -99,6 +99,11 @@ def _axes(cartpole: CartPole, own: Parameters, reference: Parameters) -> Iterato
     for name, phrase in phrases.items():
         if differences(take(reference, own, {name}), reference):
             yield name, phrase
+
+
+def _upside_down(cartpole: CartPole) -> str:
+    gravity = " ".join(f"{part:g}" for part in cartpole.model.opt.gravity)
+    return "" if directions(cartpole).up[2] > 0 else f" (gravity is {gravity})"
 
 
 def _degrees(angle: float) -> str:

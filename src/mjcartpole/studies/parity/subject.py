@@ -126,15 +126,20 @@ class Subject:
         return np.random.default_rng([self.seed, rung])
 
     def simulation(self, integrator: Integrator) -> Simulation:
-        """The model in motion, with dry friction solved to the end.
-
-        MuJoCo's solver stops at its tolerance, and with friction that grips now and then that is
-        more than rounding.
-        """
+        """The model in motion; asked about itself, with dry friction solved to the end."""
         simulation = Simulation(self.cartpole, integrator)
-        if self.own.slider_friction or self.own.hinge_friction:
+        if self.solves_to_the_end:
             simulation.model.opt.tolerance = 0.0
         return simulation
+
+    @property
+    def solves_to_the_end(self) -> bool:
+        """Whether MuJoCo's solver is kept from stopping at its tolerance.
+
+        With friction that grips, that is now and then more than rounding.
+        """
+        rubs = self.own.slider_friction or self.own.hinge_friction
+        return self.against == "itself" and rubs is not None
 
     def ours(self, integrator: Integrator = "gym", **options: Any) -> gymnasium.Env[Any, Any]:  # noqa: ANN401
         """Our environment with this model."""
