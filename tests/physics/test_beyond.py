@@ -14,6 +14,7 @@ from mjcartpole.physics.beyond import (
     overridden_masses,
 )
 from mjcartpole.physics.equations import step
+from mjcartpole.physics.file_steps import method_of
 from mjcartpole.physics.free_region import free_region
 from mjcartpole.physics.model import load_model
 from mjcartpole.physics.parameters import read_parameters
@@ -249,7 +250,12 @@ def test_steps_that_are_not_eulers_are_named():
     assert beyond_step(changed(('"Euler"', '"implicitfast"'))) == []
     assert beyond_step(changed(flag('eulerdamp="disable"'))) == []
     damped = changed(flag('eulerdamp="disable"'), plus(HINGE, 'damping="1"'))
-    assert beyond_step(damped) == ["implicit damping (eulerdamp) switched off"]
+    assert beyond_step(damped) == ["integrator Euler without eulerdamp instead of Euler"]
+    assert beyond_step(damped, method_of(damped)) == []
+    rubbing = changed(('"Euler"', '"discrete"'), plus(HINGE, 'frictionloss="1"'))
+    assert beyond_step(rubbing, method_of(rubbing)) == [
+        "friction that the integrator discrete solves in its own way"
+    ]
 
 
 def test_numbers_that_no_episode_feels():

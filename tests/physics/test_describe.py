@@ -76,7 +76,7 @@ def test_y_up_and_no_names():
             ('<motor name="push" joint="slider" gear="10"', '<position joint="slider" kp="7"'),
             "action 0: -7 N, action 1: 7 N at rest at x = 0, by a servo (control -1 or 1, gear 1)",
         ),
-        (('"Euler"', '"RK4"'), "apply to the accelerations, not to a step: integrator RK4"),
+        (('"Euler"', '"RK4"'), "equations   apply"),
         (
             ('name="hinge"', 'name="hinge" stiffness="1"'),
             "do not apply: spring (stiffness) in joint",

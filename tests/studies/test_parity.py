@@ -345,8 +345,15 @@ def test_what_the_equations_do_not_cover_is_named_and_not_passed(name):
     assert all(cause in result.skipped for result in results.values())
 
 
-def test_rk4_is_a_right_answer_to_the_question_about_itself():
-    _, results = climb(changed(('integrator="Euler"', 'integrator="RK4"')), "itself", (3, 4))
+@pytest.mark.parametrize("limits", ["", ' range="-1 1"'])
+@pytest.mark.parametrize("integrator", ["RK4", "implicit", "implicitfast", "discrete"])
+def test_each_integrator_is_a_right_answer_to_the_question_about_itself(integrator, limits):
+    text = changed(
+        ('integrator="Euler"', f'integrator="{integrator}"'),
+        ('name="hinge"', 'name="hinge" damping="0.1"'),
+        ('name="slider"', f'name="slider" damping="1"{limits}'),
+    )
+    _, results = climb(text, "itself", (3, 4))
     assert failures(results) == set()
 
 

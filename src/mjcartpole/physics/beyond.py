@@ -10,11 +10,11 @@ import mujoco
 import numpy as np
 
 from mjcartpole.errors import ModelError
-from mjcartpole.physics import equations
 from mjcartpole.physics.bodies import moving_bodies
 from mjcartpole.physics.deviations import deviations
 from mjcartpole.physics.engine_check import unexplained_forces
 from mjcartpole.physics.equations import CARTPOLE_V1, Parameters
+from mjcartpole.physics.file_steps import file_step, method_of
 from mjcartpole.physics.free_region import free_region
 from mjcartpole.physics.model import CartPole, with_options
 from mjcartpole.physics.parameters import (
@@ -31,6 +31,9 @@ Effect = tuple[str, str]
 """The kind of force by which it acts (MuJoCo's `qfrc_…`), and a phrase that names it."""
 
 _STEPS: Final = 64
+_BOX: Final = (4.8, 10.0, np.pi, 10.0)
+"""Sampled states are within ± this: m, m/s, rad, rad/s."""
+
 _SAME_STEP: Final = 1e-9
 """Of the values of a step, relative: more than rounding, less than another integrator's."""
 
@@ -66,34 +69,38 @@ def beyond_equations(cartpole: CartPole) -> list[str]:
     return named + [phrase for kind, phrase in unknown.items() if kind not in known]
 
 
-def beyond_step(cartpole: CartPole) -> list[str]:
-    """Why one step of the file's own integrator is not the semi-implicit `equations.step`.
+def beyond_step(cartpole: CartPole, method: str = "Euler") -> list[str]:
+    """Why one step of the file's own integrator is not that of a method of the equations.
+
+    Args:
+        cartpole: The model.
+        method: One of `file_steps.METHODS`.
 
     Returns:
-        One phrase; none for an integrator whose steps are the same here, as those of MuJoCo's
-        `Euler` with implicit damping are, and those of others where little turns or brakes.
+        One phrase; none where the steps are the same, as those of two methods are where little
+        turns or brakes.
     """
+    named = f"integrator {method_of(cartpole)} instead of {method}"
     if cartpole.poles > 1 or beyond_equations(cartpole):
-        same = cartpole.integrator in {"Euler", "implicitfast"}
-        return [] if same else [f"integrator {cartpole.integrator} instead of Euler"]
-    if _steps_as_euler(cartpole):
+        return [] if cartpole.integrator in {"Euler", "implicitfast", method} else [named]
+    if _steps_as(cartpole, method):
         return []
-    if cartpole.integrator == "Euler":
-        return ["implicit damping (eulerdamp) switched off"]
-    return [f"integrator {cartpole.integrator} instead of Euler"]
+    if cartpole.integrator == "discrete":
+        return ["friction that the integrator discrete solves in its own way"]
+    return [named]
 
 
-def _steps_as_euler(cartpole: CartPole) -> bool:
-    region = free_region(cartpole).within((-4.8, 4.8), (-np.pi, np.pi))
-    rng, p = np.random.default_rng(0), read_parameters(cartpole)
-    low = np.array([region.x[0], -10.0, region.theta[0], -10.0])
-    high = np.array([region.x[1], 10.0, region.theta[1], 10.0])
-    states, actions = rng.uniform(low, high, (_STEPS, 4)), rng.integers(2, size=_STEPS)
-    found = Simulation(with_options(cartpole), "mujoco").steps(
-        states, np.array(cartpole.controls)[actions]
-    )
-    expected = equations.step(p, states, np.array(p.forces)[actions], "mujoco")
-    scale = np.maximum(1.0, np.abs(expected).max(axis=0))
+def _steps_as(cartpole: CartPole, method: str) -> bool:
+    p, rng, region = read_parameters(cartpole), np.random.default_rng(0), free_region(cartpole)
+    low, high = region.box(_BOX)
+    states = rng.uniform(low, high, (_STEPS, 4))
+    states = states[region.holds_for_a_step(states, p)]
+    actions = rng.integers(2, size=len(states))
+    simulation = Simulation(with_options(cartpole), "mujoco")
+    simulation.model.opt.tolerance = 0.0
+    found = simulation.steps(states, np.array(cartpole.controls)[actions])
+    expected = file_step(p, states, np.array(p.forces)[actions], method)
+    scale = np.maximum(1.0, np.abs(expected).max(axis=0, initial=0.0))
     return bool((np.abs(found - expected) <= _SAME_STEP * scale).all())
 
 

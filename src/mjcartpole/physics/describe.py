@@ -10,6 +10,7 @@ import numpy as np
 from mjcartpole import task
 from mjcartpole.physics.beyond import beyond_equations, beyond_step
 from mjcartpole.physics.bodies import cart_bodies, mass_of, pole_bodies
+from mjcartpole.physics.file_steps import method_of
 from mjcartpole.physics.model import CartPole
 from mjcartpole.physics.structure import LEAST_ARM, Directions, Vector, directions, is_servo, push
 
@@ -193,7 +194,7 @@ def describe(cartpole: CartPole) -> Description:
         cart_mass=mass_of(model, cart_bodies(cartpole)),
         rail_limits=(limits[0], limits[1]) if has_ends else None,
         beyond=tuple(beyond_equations(cartpole)),
-        beyond_step=tuple(beyond_step(cartpole)),
+        beyond_step=tuple(beyond_step(cartpole, method_of(cartpole))),
     )
 
 

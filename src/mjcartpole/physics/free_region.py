@@ -13,9 +13,12 @@ import numpy as np
 import numpy.typing as npt
 
 from mjcartpole import task
+from mjcartpole.physics.equations import Parameters, derivative
 from mjcartpole.physics.model import CartPole
 from mjcartpole.physics.parameters import is_on, joint_label, label
 from mjcartpole.physics.simulation import nothing_can_touch
+
+Vector: TypeAlias = npt.NDArray[np.float64]
 
 Interval: TypeAlias = tuple[float, float]
 
@@ -58,6 +61,14 @@ class FreeRegion:
         """The part of it that lies inside other bounds."""
         return FreeRegion(_common(self.x, x), _common(self.theta, theta), self.bounds, self.blocked)
 
+    def box(self, bound: npt.ArrayLike) -> tuple[Vector, Vector]:
+        """The lowest and highest states within ± a bound, shape (4,), that lie in it."""
+        high = np.array(bound, dtype=np.float64)
+        low = -high
+        inside = self.within((low[0], high[0]), (low[2], high[2]))
+        (low[0], high[0]), (low[2], high[2]) = inside.x, inside.theta
+        return low, high
+
     def holds(self, states: npt.NDArray[np.float64]) -> npt.NDArray[np.bool_]:
         """Whether each of many states, shape (..., 4), lies in it."""
         x, theta = states[..., 0], states[..., 2]
@@ -68,6 +79,17 @@ class FreeRegion:
             & (theta <= self.theta[1])
         )
         return inside
+
+    def holds_for_a_step(self, states: Vector, p: Parameters) -> npt.NDArray[np.bool_]:
+        """Whether each of many states lies in it and stays there for a step, wherever it goes."""
+        reach = p.timestep * np.abs(states[:, [1, 3]])
+        for force in p.forces:
+            speed_up = p.timestep * np.abs(derivative(p, states, force)[:, [1, 3]])
+            reach = np.maximum(reach, 2 * p.timestep * (np.abs(states[:, [1, 3]]) + speed_up))
+        there, back = states.copy(), states.copy()
+        there[:, [0, 2]] += reach
+        back[:, [0, 2]] -= reach
+        return self.holds(there) & self.holds(back)
 
 
 def free_region(cartpole: CartPole) -> FreeRegion:

@@ -12,6 +12,7 @@ from mjcartpole.integrator import Integrator
 from mjcartpole.physics import equations
 from mjcartpole.physics.dry_friction import DryFriction
 from mjcartpole.physics.equations import Parameters, coefficients
+from mjcartpole.physics.file_steps import file_step
 from mjcartpole.studies.parity.diagnosis import Predict, likely_cause
 from mjcartpole.studies.parity.result import Figure, Result
 from mjcartpole.studies.parity.subject import Against, Batch, Subject, Vector
@@ -147,25 +148,18 @@ def _one_step(subject: Subject, rung: int, integrator: Integrator, title: str) -
     reason = f"rounding: {bound:.0f} ulp of 1, or of the value{terms}, if that is larger"
     if subject.against == "itself":
         beyond = subject.beyond + (subject.beyond_step if integrator == "mujoco" else [])
-        if _is_own_rk4(subject):
-            beyond = subject.beyond
         if beyond:
             return beyond_result(rung, title, reason, beyond)
     rows = [_against_equations(subject, rung, integrator)]
     absent = subject.gym_cannot
-    if integrator == "mujoco" and _is_own_rk4(subject):
-        absent = "it has no RK4"
+    if integrator == "mujoco" and subject.method not in {"Euler", "implicitfast"}:
+        absent = absent or f"it has no {subject.method}"
     if not absent:
         rows += _against_gymnasium(subject, rung, integrator)
     figures = tuple(figure for figure, _ in rows)
     note = (f"gymnasium is no witness here: {absent}",) if absent else ()
     failed = [story for figure, story in rows if not figure.holds]
     return Result(rung, title, reason, figures, (), (*(failed[0] if failed else ()), *note))
-
-
-def _is_own_rk4(subject: Subject) -> bool:
-    """Whether the file's RK4 is the method to be checked, instead of a difference."""
-    return subject.against == "itself" and subject.cartpole.integrator == "RK4"
 
 
 Row = tuple[Figure, tuple[str, ...]]
@@ -182,9 +176,9 @@ def _predict(subject: Subject, batch: Batch, integrator: Integrator) -> Predict:
 
     def predict(p: Parameters) -> Vector:
         forces = np.array(p.forces)[batch.actions]
-        if integrator == "mujoco" and _is_own_rk4(subject):
-            return equations.rk4_step(p, batch.states, forces)
-        return equations.step(p, batch.states, forces, integrator)
+        if integrator == "mujoco":
+            return file_step(p, batch.states, forces, subject.method)
+        return equations.step(p, batch.states, forces)
 
     return predict
 

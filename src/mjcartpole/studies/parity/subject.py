@@ -19,6 +19,7 @@ from mjcartpole.physics.beyond import beyond_equations, beyond_step, idle_number
 from mjcartpole.physics.bodies import farthest_from_origin
 from mjcartpole.physics.deviations import Deviation, deviations
 from mjcartpole.physics.equations import CARTPOLE_V1, Parameters
+from mjcartpole.physics.file_steps import method_of
 from mjcartpole.physics.free_region import FreeRegion, free_region
 from mjcartpole.physics.model import CartPole, with_options
 from mjcartpole.physics.parameters import read_parameters
@@ -90,10 +91,15 @@ class Subject:
         met = [] if self.region.bounds else free_region(self.cartpole).bounds
         return list(dict.fromkeys([*met, *beyond_equations(self.cartpole)]))
 
+    @property
+    def method(self) -> str:
+        """By which method of the equations the file's own integrator shall step."""
+        return "Euler" if self.against == "cartpole-v1" else method_of(self.cartpole)
+
     @cached_property
     def beyond_step(self) -> list[str]:
-        """Why one step of the file's own integrator is not semi-implicit Euler."""
-        return beyond_step(self.cartpole)
+        """Why one step of the file's own integrator is not what it is held against."""
+        return beyond_step(self.cartpole, self.method)
 
     @cached_property
     def deviations(self) -> list[Deviation]:
@@ -178,11 +184,12 @@ class Subject:
 
     def random_batch(self, rung: int, n: int, box: npt.ArrayLike) -> Batch:
         """N random states within ±box, and actions."""
-        rng, bound = self.rng(rung), np.asarray(box, dtype=np.float64)
-        low, high = -bound, bound.copy()
-        inside = self.region.within((low[0], high[0]), (low[2], high[2]))
-        (low[0], high[0]), (low[2], high[2]) = inside.x, inside.theta
-        return Batch(rng.uniform(low, high, size=(n, 4)), rng.integers(2, size=n))
+        rng, (low, high) = self.rng(rung), self.region.box(box)
+        states, actions = rng.uniform(low, high, size=(n, 4)), rng.integers(2, size=n)
+        if not self.region.bounds:
+            return Batch(states, actions)
+        stays = self.region.holds_for_a_step(states, self.own)
+        return Batch(states[stays], actions[stays])
 
     def forces(self, batch: Batch) -> Vector:
         """The reference's push for each action of a batch, N."""
