@@ -25,6 +25,7 @@ def test_what_is_left_out_is_as_usual():
         {"high": None},
         {"low": math.nan},
         {"high": math.inf},
+        {"high": 10**400},
         {"low": -1e308, "high": 1e308},
         {"state": (0, 0, 0, 0)},
         {"lo": -0.1},
@@ -38,7 +39,7 @@ def test_what_makes_no_sense_is_a_value_error_and_changes_nothing(options):
     env = CartPoleEnv()
     env.reset(seed=0)
     before, draws = env.state, env.np_random.bit_generator.state
-    with pytest.raises(ConfigError, match="reset"):
+    with pytest.raises(ConfigError):
         env.reset(seed=5, options=options)
     np.testing.assert_array_equal(env.state, before)
     assert env.np_random.bit_generator.state == draws

@@ -4,6 +4,8 @@ import math
 from collections.abc import Mapping
 from typing import Any, Final, NamedTuple
 
+from gymnasium.envs.classic_control.utils import maybe_parse_reset_bounds
+
 from mjcartpole import task
 from mjcartpole.errors import ConfigError
 
@@ -36,14 +38,12 @@ def reset_options(options: Mapping[str, Any] | None) -> ResetOptions:
         return USUAL
     given = USUAL._replace(**_known(options))
     try:
-        low, high = float(given.low), float(given.high)
-    except (TypeError, ValueError, OverflowError):
-        low = high = math.nan
-    if not (low <= high and math.isfinite(high - low)):
-        raise ConfigError(
-            "reset starts between two finite numbers of which low is not above high, "
-            f"not between low={given.low!r} and high={given.high!r}"
-        )
+        # In gymnasium's own words, which CartPole-v1's users know.
+        low, high = maybe_parse_reset_bounds({"low": given.low, "high": given.high}, *USUAL[:2])
+    except (ValueError, OverflowError) as error:
+        raise ConfigError(str(error)) from error
+    if not math.isfinite(high - low):
+        raise ConfigError(f"reset starts between two finite bounds, not low={low}, high={high}")
     return ResetOptions(low, high, given.edits or ())
 
 
