@@ -14,7 +14,7 @@ from gymnasium.envs.registration import EnvSpec
 from mjcartpole import task
 from mjcartpole.envs.editable import Editable
 from mjcartpole.envs.names import CartPoleNames, refuse_slip
-from mjcartpole.envs.options import reset_options
+from mjcartpole.envs.options import USUAL, reset_options
 from mjcartpole.envs.pictures import Pictures, RenderMode
 from mjcartpole.envs.registration import ENV_ID
 from mjcartpole.envs.spec import portable
@@ -27,6 +27,7 @@ from mjcartpole.physics.simulation import (
     FARTHEST_SANE,
     Simulation,
     State,
+    as_one_pole,
     check_sane,
 )
 
@@ -203,13 +204,14 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int], CartPo
 
     @simulation.setter
     def simulation(self, simulation: Simulation) -> None:
-        self._simulation = simulation
+        self._simulation, self._model.is_stale = simulation, False
         self._wire(simulation)
 
     def _begin(self, edits: Edits = None) -> Simulation:
         """Simulate the model as it is now, with edits that last one episode."""
         before, simulation = self._simulation, self._model.begin(edits)
-        self.simulation = simulation
+        self._simulation = simulation
+        self._wire(simulation)
         self._pictures.close()
         if before and before.cartpole.control_step != simulation.cartpole.control_step:
             self._set_frame_rate(simulation.cartpole)
@@ -219,14 +221,14 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int], CartPo
         """Keep what `step` needs of a simulation at hand."""
         poles = simulation.cartpole.poles
         self._move: Callable[[float], State] = (
-            simulation.step if poles == 1 else _as_one_pole(simulation.step)
+            simulation.step if poles == 1 else as_one_pole(simulation.step)
         )
         self._left, self._right = simulation.cartpole.controls
         observation = np.zeros(4, dtype=np.float32)
         # A view that takes single floats several times faster than the array does.
         cells: memoryview[float] = observation.data.cast("B").cast("f")
         observe = observation.copy if poles == 1 else functools.partial(_observe, simulation)
-        self._at_hand = (*self._limits, cells, observe)
+        self._at_hand = (*self._limits, cells, observe, self._step_reward)
 
     def _set_limits(self, x: float, theta: float) -> None:
         super()._set_limits(x, theta)
@@ -302,14 +304,14 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int], CartPo
             raise _invalid(action)
         advance = self._advance
         x, x_dot, theta, theta_dot = advance(control)
-        x_min, x_max, theta_min, theta_max, cells, observe = self._at_hand
+        x_min, x_max, theta_min, theta_max, cells, observe, reward = self._at_hand
         if (
             x_min <= x <= x_max
             and theta_min <= theta <= theta_max
             # Neither velocity is NaN, or so large that the physics have diverged.
             and -_FARTHEST < x_dot - theta_dot < _FARTHEST
         ):
-            terminated, reward = False, self._step_reward
+            terminated = False
         else:
             terminated, reward = True, self._end()
         # None is told apart sooner than a word is.
@@ -333,15 +335,6 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int], CartPo
         count[0] += 1
         return self._late_reward
 
-    @property
-    def steps_beyond_terminated(self) -> int | None:
-        """Steps after the one that ended the episode; None before it."""
-        return self._steps_after_end[0]
-
-    @steps_beyond_terminated.setter
-    def steps_beyond_terminated(self, steps: int | None) -> None:
-        self._steps_after_end[0] = steps
-
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[npt.NDArray[np.float32], dict[str, Any]]:
@@ -357,10 +350,10 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int], CartPo
                 or an edit makes no sense; nothing has changed then.
             ModelError: The edits make the model one that cannot be used.
         """
-        low, high, edits = reset_options(options)
-        if self._model.is_stale or edits:
-            self._begin(edits)
-        simulation = self.simulation
+        low, high, edits = USUAL if options is None else reset_options(options)
+        simulation = self._simulation
+        if simulation is None or self._model.is_stale or edits:
+            simulation = self._begin(edits)
         super().reset(seed=seed)
         state = self.np_random.uniform(low=low, high=high, size=simulation.size)
         simulation.put(state.tolist())
@@ -408,20 +401,6 @@ def _is_known(name: str) -> bool:
 def _observe(simulation: Simulation) -> npt.NDArray[np.float32]:
     """The observation, also of several poles."""
     return simulation.state.astype(np.float32)
-
-
-def _as_one_pole(step: Callable[[float], State]) -> Callable[[float], State]:
-    """Steps of several poles that return what the rules look at: the worst of all poles.
-
-    That is `(x, x_dot, theta, theta_dot)` with the largest angle and the largest angular velocity,
-    without signs.
-    """
-
-    def advance(control: float) -> State:
-        state = step(control)
-        return state[0], state[1], task.farthest(state[2::2]), task.farthest(state[3::2])
-
-    return advance
 
 
 def _needs_reset(control: float) -> State:

@@ -163,6 +163,7 @@ class CartPoleNames:
     _model: Editable
     _simulation: Simulation | None
     _limits: tuple[float, float, float, float]
+    _steps_after_end: list[int | None]
 
     gravity = Number(_gravity, _edit_gravity)
     """m/s^2, downwards."""
@@ -229,6 +230,15 @@ class CartPoleNames:
         farthest = max(x, task.X_LIMIT), max(theta, task.THETA_LIMIT)
         bound = task.observation_bound(self._model.base.poles, *farthest)
         self.observation_space = spaces.Box(-bound, bound, dtype=np.float32)
+
+    @property
+    def steps_beyond_terminated(self) -> int | None:
+        """Steps after the one that ended the episode; None before it."""
+        return self._steps_after_end[0]
+
+    @steps_beyond_terminated.setter
+    def steps_beyond_terminated(self, steps: int | None) -> None:
+        self._steps_after_end[0] = steps
 
     def edit(self, edits: Mapping[str, object]) -> None:
         """Edit the model's document, with effect from the next reset.

@@ -253,6 +253,20 @@ def _state_of(
     return tuple([value for joint in joints for value in (qpos[joint], qvel[joint])])
 
 
+def as_one_pole(step: Callable[[float], State]) -> Callable[[float], State]:
+    """Steps of several poles that return what the rules look at: the worst of all poles.
+
+    That is `(x, x_dot, theta, theta_dot)` with the largest angle and the largest angular velocity,
+    without signs.
+    """
+
+    def advance(control: float) -> State:
+        state = step(control)
+        return state[0], state[1], task.farthest(state[2::2]), task.farthest(state[3::2])
+
+    return advance
+
+
 def _gave_up(cartpole: CartPole, error: mujoco.FatalError) -> SimulationError:
     reason = " ".join(str(error).split())
     return SimulationError(f"MuJoCo gave up on {cartpole.name}: {reason}")
