@@ -55,14 +55,16 @@ def in_words(poles: int) -> str:
     return "1 pole" if poles == 1 else f"{poles} poles"
 
 
-def observation_bound(poles: int = 1) -> npt.NDArray[np.float32]:
+def observation_bound(
+    poles: int = 1, x_limit: float = X_LIMIT, theta_limit: float = THETA_LIMIT
+) -> npt.NDArray[np.float32]:
     """Upper bound of the observation, shape (2 + 2 poles,); the lower bound is its negative.
 
     Positions may be twice as large as the limits that end an episode, so that the observation of
     the last step still lies inside; velocities are unbounded.
     """
-    angle = [THETA_LIMIT * 2, np.inf]
-    return np.array([X_LIMIT * 2, np.inf, *angle * poles], dtype=np.float32)
+    angle = [theta_limit * 2, np.inf]
+    return np.array([x_limit * 2, np.inf, *angle * poles], dtype=np.float32)
 
 
 def has_terminated(x: float, theta: float) -> bool:
