@@ -30,9 +30,9 @@ from mjcartpole.files import write_whole
 from mjcartpole.learning import runs
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.training import Training, train
+from mjcartpole.physics.batch_simulation import available_cores
 from mjcartpole.physics.model import load_model
 from mjcartpole.studies.many import train_many
-from mjcartpole.studies.seeds import available_cores
 
 Section = Callable[[bool], Iterator[Ratio]]
 
