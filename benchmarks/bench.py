@@ -2,8 +2,8 @@
 
     python -m benchmarks.bench [--quick] [--json FILE] [--only SECTION …]
 
-Medians over repeats, with the lowest and the highest. Sections: step, vector, training, seeds,
-start, memory. What the figures mean, and where each microsecond goes: docs/performance.md.
+Medians over repeats, with the lowest and the highest. Sections: step, vector, threads, training,
+seeds, start, memory. What the figures mean, and where each microsecond goes: docs/performance.md.
 """
 
 import argparse
@@ -21,7 +21,7 @@ import gymnasium
 import numpy as np
 from benchmarks.article import train_like_the_article
 from benchmarks.others import GymnasiumMujoco, dm_control_environment, raw_steps
-from benchmarks.ratios import Ratio, compare
+from benchmarks.ratios import Ratio, compare, seconds
 from mujoco.batch import Batch
 
 import mjcartpole
@@ -104,6 +104,25 @@ def vector(quick: bool) -> Iterator[Ratio]:
     name = "64 environments against gymnasium's SyncVectorEnv of ours"
     works = (_play_vector(made, 5 * blocks) for made in (envs, sync))
     yield compare("vector", name, *works, repeats=5 if quick else 15)
+
+
+def threads(quick: bool) -> Iterator[Ratio]:
+    """The vector's own choice of threads against one, and against all cores."""
+    repeats, block = (15, 0.003) if quick else (61, 0.01)
+    for substeps in (1, 10, 100):
+        for n in (1, 2, 4, 16, 64, 128, 256, 512, 1_024, 4_096):
+            edits = {"option.timestep": 0.02 / substeps}
+            works = {}
+            for count in (None, 1, available_cores()):
+                envs = gymnasium.make_vec(mjcartpole.ENV_ID, n, threads=count, edits=edits)
+                # The first steps hold the first trial.
+                length = seconds(_play_vector(envs, 20)) / 20
+                works[count] = _play_vector(envs, max(1, round(block / length)))
+            for count, words in ((1, "one thread"), (available_cores(), "all")):
+                name = f"{n} environments of {substeps} physics steps against {words}"
+                yield compare(
+                    "threads", name, works[None], works[count], repeats=repeats, wanted=0.95
+                )
 
 
 def _play_vector(envs: gymnasium.vector.VectorEnv[Any, Any, Any], steps: int) -> Callable[[], None]:
@@ -225,6 +244,7 @@ def memory(quick: bool) -> None:
 SECTIONS: dict[str, Section] = {
     "step": step,
     "vector": vector,
+    "threads": threads,
     "training": training,
     "seeds": seeds,
     "start": start,
