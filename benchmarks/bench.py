@@ -107,22 +107,24 @@ def vector(quick: bool) -> Iterator[Ratio]:
 
 
 def threads(quick: bool) -> Iterator[Ratio]:
-    """The vector's own choice of threads against one, and against all cores."""
-    repeats, block = (15, 0.003) if quick else (61, 0.01)
+    """The vector's own choice of threads against one, and against all cores.
+
+    Blocks are short, so that most of them run without another program in between.
+    """
+    repeats, block = (41, 0.002) if quick else (301, 0.004)
     for substeps in (1, 10, 100):
         for n in (1, 2, 4, 16, 64, 128, 256, 512, 1_024, 4_096):
             edits = {"option.timestep": 0.02 / substeps}
-            works = {}
-            for count in (None, 1, available_cores()):
-                envs = gymnasium.make_vec(mjcartpole.ENV_ID, n, threads=count, edits=edits)
-                # The first steps hold the first trial.
-                length = seconds(_play_vector(envs, 20)) / 20
-                works[count] = _play_vector(envs, max(1, round(block / length)))
-            for count, words in ((1, "one thread"), (available_cores(), "all")):
+            envs = [
+                gymnasium.make_vec(mjcartpole.ENV_ID, n, threads=count, edits=edits)
+                for count in (None, 1, available_cores())
+            ]
+            # The first steps hold the first trial.
+            length = [seconds(_play_vector(each, 20)) / 20 for each in envs][1]
+            own, *others = (_play_vector(each, max(1, round(block / length))) for each in envs)
+            for words, other in zip(("one thread", "all"), others, strict=True):
                 name = f"{n} environments of {substeps} physics steps against {words}"
-                yield compare(
-                    "threads", name, works[None], works[count], repeats=repeats, wanted=0.95
-                )
+                yield compare("threads", name, own, other, repeats=repeats, wanted=0.95)
 
 
 def _play_vector(envs: gymnasium.vector.VectorEnv[Any, Any, Any], steps: int) -> Callable[[], None]:

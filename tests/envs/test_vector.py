@@ -489,13 +489,36 @@ def test_a_diverging_model_is_an_error_on_any_thread(integrator):
             envs.step(np.ones(64, dtype=int))
 
 
+@pytest.mark.parametrize("threads", [1, None])
+@pytest.mark.parametrize("integrator", ["gym", "mujoco"])
+def test_what_mujoco_gives_up_on_is_an_error_of_ours(integrator, threads):
+    # Too little memory for the contacts with the stops.
+    tight = edited(*TOUCHING, ("<option", '<size memory="11000"/><option'))
+    envs = CartPoleVectorEnv(8, model=tight.xml, integrator=integrator, threads=threads)
+    envs.state = np.tile([[2.3], [3.0], [0.0], [0.0]], 8)
+    with pytest.raises(SimulationError, match="MuJoCo gave up on"):
+        for _ in range(10):
+            envs.step(np.ones(8, dtype=int))
+
+
+def test_edits_may_be_texts():
+    envs = gymnasium.make_vec(ENV_ID, num_envs=2, edits=["pole.length=1.5"])
+    assert envs.cartpole.name == "cartpole with pole.length=1.5"
+
+
 @pytest.mark.parametrize(
     ("arguments", "error", "message"),
     [
         ({"model": "nothing"}, ModelNotFoundError, "no model is called 'nothing'"),
         ({"integrator": "rk4"}, ConfigError, "available: gym, mujoco"),
         ({"render_mode": "human"}, ConfigError, "available: None, 'rgb_array'"),
-        ({"render_mode": "rgb_array_list"}, ConfigError, 'vectorization_mode="sync"'),
+        ({"render_mode": "depth"}, ConfigError, 'vectorization_mode="sync"'),
+        (
+            {"edits": [{"pole.length": 1.0}, {}]},
+            ConfigError,
+            "one mapping.*not {'pole.length': 1.0}",
+        ),
+        ({"edits": 5}, ConfigError, "one mapping.*not 5"),
         ({"num_envs": 0}, ConfigError, "num_envs 0 makes no sense"),
         ({"num_envs": 2.0}, ConfigError, "num_envs 2.0 makes no sense"),
         ({"max_episode_steps": 0}, ConfigError, "max_episode_steps 0 makes no sense"),
@@ -531,8 +554,9 @@ def test_gymnasiums_statistics_count_the_same(n):
     assert found[0] == found[1]
 
 
-def test_one_picture_per_environment():
-    envs = gymnasium.make_vec(ENV_ID, num_envs=2, render_mode="rgb_array", width=160, height=120)
+@pytest.mark.parametrize("mode", ["rgb_array", "rgb_array_list"])
+def test_one_picture_per_environment(mode):
+    envs = gymnasium.make_vec(ENV_ID, num_envs=2, render_mode=mode, width=160, height=120)
     assert envs.render() is None
     envs.reset(seed=0)
     envs.unwrapped.state = [(0.0, 1.0), (0.0, 0.0), (0.0, 0.1), (0.0, 0.0)]

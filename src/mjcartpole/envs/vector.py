@@ -19,7 +19,7 @@ from mjcartpole.media.scene import DEFAULT_CAMERA, check_picture
 from mjcartpole.physics.batch_simulation import BatchSimulation
 from mjcartpole.physics.model import Edits, ModelLike, load_model
 
-VectorRenderMode = Literal["rgb_array"]
+VectorRenderMode = Literal["rgb_array", "rgb_array_list"]
 
 _DEFAULT_PICTURE: Final = (DEFAULT_WIDTH, DEFAULT_HEIGHT, DEFAULT_CAMERA)
 
@@ -82,7 +82,7 @@ class CartPoleVectorEnv(
     | `integrator`          | "gym" or "mujoco"      | "gym"       | As in `CartPoleEnv`           |
     | `sutton_barto_reward` | bool                   | False       | 0 per step and -1 at termination, instead of 1 per step |
     | `threads`             | int or None            | None        | Threads that step; None: as many as pay, which the time decides |
-    | `render_mode`         | None or "rgb_array"    | None        | Nothing, or one picture per environment |
+    | `render_mode`         | None, "rgb_array", "rgb_array_list" | None | Nothing, or one picture per environment (the two are the same, as in gymnasium's vector) |
     | `width`, `height`     | int                    | 640, 480    | Size of a picture, in pixels  |
     | `camera`              | str                    | "side"      | A camera of the model         |
 
@@ -101,7 +101,7 @@ class CartPoleVectorEnv(
     """  # noqa: E501 - a table's rows cannot be wrapped
 
     metadata: dict[str, Any] = {  # noqa: RUF012 - gymnasium's own declaration
-        "render_modes": list(get_args(VectorRenderMode)),
+        "render_modes": ["rgb_array"],
         "render_fps": task.frame_rate(),
         "autoreset_mode": AutoresetMode.NEXT_STEP,
     }
