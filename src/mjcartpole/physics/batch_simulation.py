@@ -182,7 +182,7 @@ class BatchSimulation:
             self._other = self._batch
             self._use(other)
         if is_trial:
-            worse = min(max(1.0, took / self._to_beat), 10.0)
+            worse = min(max(1.0, took / self._to_beat), 100.0)
             self._until_choice, self._to_beat = int(_TRIAL * worse / _TRIAL_COST), float("nan")
         else:
             self._until_choice, self._to_beat = _TRIAL, took
