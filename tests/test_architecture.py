@@ -36,7 +36,7 @@ TOP = {
     "__main__",
     "__init__",
 }
-MUJOCO_HOMES = ("physics/", "media/", "envs/vector.py")
+MUJOCO_HOMES = ("physics/", "media/")
 
 SOURCES = sorted(PACKAGE.rglob("*.py"))
 

@@ -325,7 +325,7 @@ def test_a_control_step_can_be_the_files_own(integrator):
     assert x == pytest.approx(0.015 * (1.0 if integrator == "gym" else x_dot), rel=1e-6)
     vector = CartPoleVectorEnv(2, model=odd, own_timestep=True, integrator=integrator)
     vector.reset(seed=0)
-    vector.state = [(0.0, 1.0, 0.0, 0.0)] * 2
+    vector.state = [(0.0, 0.0), (1.0, 1.0), (0.0, 0.0), (0.0, 0.0)]
     assert vector.step([1, 1])[0][1][0] == x
 
 

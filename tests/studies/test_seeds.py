@@ -8,10 +8,11 @@ import pytest
 from mjcartpole.errors import ConfigError, ModelError
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.training import train
+from mjcartpole.physics.batch_simulation import available_cores
 from mjcartpole.physics.model import load_model
 from mjcartpole.studies.evaluation import evaluate
 from mjcartpole.studies.many import train_many
-from mjcartpole.studies.seeds import Crew, available_cores
+from mjcartpole.studies.seeds import Crew
 
 CONFIG = TrainConfig(episodes=15, backend="gym", seed=4)
 

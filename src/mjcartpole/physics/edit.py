@@ -66,7 +66,14 @@ def edits_of(edits: Mapping[str, object] | Sequence[str]) -> dict[str, object]:
     if isinstance(edits, Mapping):
         return dict(edits)
     found: dict[str, object] = {}
-    for key, value in map(parse_edit, [edits] if isinstance(edits, str) else edits):
+    texts = [edits] if isinstance(edits, str) or not isinstance(edits, Iterable) else edits
+    for text in texts:
+        if not isinstance(text, str):
+            raise ConfigError(
+                'edits are one mapping such as {"pole.length": 1.5}, or texts such as '
+                f'"pole.length=1.5", not {text!r}'
+            )
+        key, value = parse_edit(text)
         if key in found:
             raise ConfigError(f"{key!r} is edited twice; give one value")
         found[key] = value

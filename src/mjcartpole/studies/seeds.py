@@ -21,6 +21,7 @@ from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.engine import Engine, choose_engine
 from mjcartpole.learning.session import CHECKPOINT_EVERY, Session
 from mjcartpole.learning.training import Training, TrainResult
+from mjcartpole.physics.batch_simulation import available_cores
 from mjcartpole.physics.model import CartPole, load_model
 from mjcartpole.studies.conduct import conclude, evaluate_where_trained
 from mjcartpole.studies.statistics import Aggregate, aggregate
@@ -318,10 +319,3 @@ def _check_workers(workers: int | None) -> int:
     if workers < 1:
         raise ConfigError(f"workers must be a number from 1 up, not {workers}")
     return workers
-
-
-def available_cores() -> int:
-    """Cores that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
