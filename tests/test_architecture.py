@@ -24,6 +24,7 @@ LAYERS = [
 ]
 TOP = {
     "signals",
+    "output",
     "commands",
     "train_command",
     "render_command",

@@ -43,7 +43,8 @@ def write_whole(path: str | os.PathLike[str], text: str) -> None:
         FileError: The folder cannot be written, or the disk is full.
     """
     with replacing(path) as temporary:
-        temporary.write_bytes(text.encode("utf-8"))
+        # A file name in it that is no text is escaped, as JSON does it.
+        temporary.write_bytes(text.encode("utf-8", "backslashreplace"))
 
 
 def make_folder(path: str | os.PathLike[str]) -> Path:
