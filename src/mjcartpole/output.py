@@ -13,7 +13,7 @@ import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, TextIO
+from typing import TYPE_CHECKING, Any, Final, TextIO
 
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer
@@ -76,7 +76,7 @@ def _patient(stream: TextIO | None) -> TextIO:
         return stream  # A notebook's, or a test's.
     stream.flush()
     buffer = stream.buffer
-    raw: io.RawIOBase = getattr(buffer, "raw", buffer)  # `python -u` has no buffer.
+    raw: Any = getattr(buffer, "raw", buffer)  # `python -u` has no buffer.
     return io.TextIOWrapper(
         io.BufferedWriter(_Patient(raw)),
         encoding=stream.encoding,

@@ -164,7 +164,7 @@ def run_watch(
     Raises:
         ModelNotFoundError: There is no such file.
         ConfigError: A setting makes no sense.
-        Interrupted: After Ctrl-C or SIGTERM.
+        Interrupted: After Ctrl-C, SIGTERM or SIGHUP.
     """
     silence_mujoco()
     check_integrator(integrator)
