@@ -10,6 +10,7 @@ import dataclasses
 import io
 import json
 import logging
+import re
 import sys
 from collections.abc import Callable, Sequence
 from typing import Annotated, Any, NoReturn
@@ -36,6 +37,8 @@ from mjcartpole.signals import Interrupted, StopSignals
 
 FAILED = 2
 INTERRUPTED = 130
+_DASHED_FILE = re.compile(r"-(?!-|o=).+\.(mp4|gif|webp|png|xml|json)")
+"""A file whose name begins with a dash: no flag with a single one looks like this."""
 COMMANDS = ("train", "evaluate", "render", "parity", "doctor", "model", "transfer", "watch")
 
 
@@ -281,7 +284,7 @@ def parse(argv: Sequence[str]) -> Command:
         UsageError: A word of it is not understood.
         SystemExit: With code 0, after `--help`.
     """
-    argv = _gather_edits(argv)
+    argv = _gather_edits([f"./{word}" if _DASHED_FILE.fullmatch(word) else word for word in argv])
     preset = _preset_in(argv)
     train_default = Train(config=TrainConfig.preset(preset), preset=preset)
     grammar = (
