@@ -307,9 +307,9 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int]):
                 self._window = self._open_window()
             self._window.show(self.state)
             return None
-        if self._renderer is None:
-            self._renderer = self._open_renderer()
-        return self._renderer.render(self.state)
+        # Held by a name of its own: another thread may close it meanwhile.
+        renderer = self._renderer = self._renderer or self._open_renderer()
+        return renderer.render(self.state)
 
     def close(self) -> None:
         """Free the renderer and the window, if there are any."""
