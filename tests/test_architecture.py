@@ -14,6 +14,7 @@ LAYERS = [
     "errors",
     "task",
     "integrator",
+    "leftovers",
     "files",
     "versions",
     "physics",
