@@ -14,6 +14,7 @@ LAYERS = [
     "errors",
     "task",
     "integrator",
+    "leftovers",
     "files",
     "versions",
     "physics",
@@ -24,6 +25,7 @@ LAYERS = [
 ]
 TOP = {
     "signals",
+    "output",
     "commands",
     "train_command",
     "render_command",

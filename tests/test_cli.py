@@ -135,6 +135,38 @@ def test_rendering_either_backend(run, backend, capsys):
     assert seconds == pytest.approx(frames / 50, abs=0.011)
 
 
+@pytest.mark.parametrize(
+    "name",
+    [
+        "concat:x.mp4",
+        "pipe:1.mp4",
+        "file:y.mp4",
+        "a|b.mp4",
+        "c%03d.mp4",
+        "-z.mp4",
+        "concat:d/q.mp4",
+    ],
+)
+def test_a_videos_path_is_a_path_whatever_it_looks_like(run, here, name, capsys):
+    code, out, err = call(["render", run, "-o", name, "--size", "64x48"], capsys)
+    assert (code, err) == (0, "")
+    assert f"video  {name}  (" in out
+    written = [str(path.relative_to(here)) for path in here.rglob("*.mp4")]
+    assert written == [name]
+    assert frames_of(here / name)[0] > 5
+
+
+def test_a_file_whose_name_begins_with_a_dash_is_a_file(run, here, capsys):
+    (here / "-mine.xml").write_text(load_model().xml)
+    assert call(["model", "show", "-mine.xml"], capsys)[0] == 0
+    assert (
+        call(["model", "edit", "-mine.xml", "--set=pole.length=1", "-o", "-2.xml"], capsys)[0] == 0
+    )
+    assert (here / "-2.xml").is_file()
+    assert call(["render", run, "-o=-3.gif", "--size", "64x48"], capsys)[0] == 0
+    assert (here / "-3.gif").is_file()
+
+
 def test_training_films_its_first_evaluation_episode(here, capsys):
     code, out, _ = call(["train", "--episodes", "5", "--run-dir", "runs/film"], capsys)
     assert code == 0

@@ -1,7 +1,8 @@
 """The command line: parse, call, print.
 
-Results go to stdout, progress and errors to stderr. Exit codes: 0, 2 for a user's mistake, 130
-after Ctrl-C. Heavy modules are imported by the command that needs them, so `--help` is quick.
+Results go to stdout, progress and errors to stderr. Exit codes: 0, 2 for a user's mistake or for
+results that could not be printed, 130 after Ctrl-C. Heavy modules are imported by the command that
+needs them, so `--help` is quick.
 """
 
 import contextlib
@@ -9,7 +10,7 @@ import dataclasses
 import io
 import json
 import logging
-import os
+import re
 import sys
 from collections.abc import Callable, Sequence
 from typing import Annotated, Any, NoReturn
@@ -31,9 +32,13 @@ from mjcartpole.flags import (
     Watch,
 )
 from mjcartpole.learning.config import TrainConfig
+from mjcartpole.output import has_left, patient_output, stdout_problem
 from mjcartpole.signals import Interrupted, StopSignals
 
+FAILED = 2
 INTERRUPTED = 130
+_DASHED_FILE = re.compile(r"-(?!-|o=).+\.(mp4|gif|webp|png|xml|json)")
+"""A file whose name begins with a dash: no flag with a single one looks like this."""
 COMMANDS = ("train", "evaluate", "render", "parity", "doctor", "model", "transfer", "watch")
 
 
@@ -43,19 +48,31 @@ class UsageError(MjCartPoleError):
 
 def main(argv: Sequence[str] | None = None) -> NoReturn:
     """Run a command and exit with its code."""
-    try:
-        code = _run(list(sys.argv[1:] if argv is None else argv))
-    except MjCartPoleError as error:
-        print(f"mjcartpole: error: {error}", file=sys.stderr)
-        code = 2
-    except KeyboardInterrupt as interrupt:
-        print(f"mjcartpole: {str(interrupt) or 'interrupted'}", file=sys.stderr)
-        code = getattr(interrupt, "exit_code", INTERRUPTED)
-    except BrokenPipeError:
-        # The reader of stdout has gone (`mjcartpole … | head`): nothing is left to say.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        code = 0
+    with patient_output():
+        code = _exit_code(list(sys.argv[1:] if argv is None else argv))
+        problem = stdout_problem()
+        if problem is not None and not has_left(problem):
+            reason = problem.strerror or problem
+            _complain(f"error: stdout could not be written ({reason}); all else went on without it")
+            code = code or FAILED
     sys.exit(code)
+
+
+def _exit_code(argv: list[str]) -> int:
+    try:
+        return _run(argv)
+    except SystemExit as stop:  # After --help.
+        return int(stop.code or 0)
+    except MjCartPoleError as error:
+        _complain(f"error: {error}")
+        return FAILED
+    except KeyboardInterrupt as interrupt:
+        _complain(str(interrupt) or "interrupted")
+        return int(getattr(interrupt, "exit_code", INTERRUPTED))
+
+
+def _complain(message: str) -> None:
+    print(f"mjcartpole: {message}", file=sys.stderr)
 
 
 def _run(argv: list[str]) -> int:
@@ -244,7 +261,7 @@ class _ToStderr(logging.Handler):
     """One line per record on what is stderr at that time: a progress bar may have taken it over."""
 
     def emit(self, record: logging.LogRecord) -> None:
-        print(f"mjcartpole: {record.getMessage()}", file=sys.stderr)
+        _complain(record.getMessage())
 
 
 def _report_to_stderr() -> None:
@@ -268,7 +285,7 @@ def parse(argv: Sequence[str]) -> Command:
         UsageError: A word of it is not understood.
         SystemExit: With code 0, after `--help`.
     """
-    argv = _gather_edits(argv)
+    argv = _gather_edits([f"./{word}" if _DASHED_FILE.fullmatch(word) else word for word in argv])
     preset = _preset_in(argv)
     train_default = Train(config=TrainConfig.preset(preset), preset=preset)
     grammar = (

@@ -85,7 +85,7 @@ def run_train(config: TrainConfig, how: How, where: Where) -> int:
     """Train, evaluate, film; print what came out. Returns the exit code.
 
     Raises:
-        Interrupted: After Ctrl-C or SIGTERM, when what was learned is kept; says where.
+        Interrupted: After Ctrl-C, SIGTERM or SIGHUP, when what was learned is kept; says where.
     """
     cartpole = _prepare(config, how)
     folder, preset = where.folder(f"{config.backend}-seed{config.seed}"), where.preset
@@ -141,7 +141,7 @@ def run_seeds(config: TrainConfig, how: How, where: Where, *, seeds: int) -> int
     """Train many seeds side by side, and print statistics over them. Returns the exit code.
 
     Raises:
-        Interrupted: After Ctrl-C or SIGTERM, when what was learned is kept; says where.
+        Interrupted: After Ctrl-C, SIGTERM or SIGHUP, when what was learned is kept; says where.
     """
     cartpole = _prepare(config, how)
     folder = where.folder(f"{config.backend}-seeds{config.seed}-{config.seed + seeds - 1}")

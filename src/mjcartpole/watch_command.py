@@ -19,6 +19,7 @@ from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.training import Training, TrainResult
 from mjcartpole.media.renderer import open_renderer
 from mjcartpole.media.video import write_video
+from mjcartpole.output import stdout_problem
 from mjcartpole.physics.model import CartPole, find_model, self_contained
 from mjcartpole.physics.simulation import silence_mujoco
 from mjcartpole.signals import Interrupted, StopSignals
@@ -163,7 +164,7 @@ def run_watch(
     Raises:
         ModelNotFoundError: There is no such file.
         ConfigError: A setting makes no sense.
-        Interrupted: After Ctrl-C or SIGTERM.
+        Interrupted: After Ctrl-C, SIGTERM or SIGHUP.
     """
     silence_mujoco()
     check_integrator(integrator)
@@ -210,6 +211,8 @@ def _watch(watched: Watched, recipe: Recipe, once: int | None) -> None:
         if once is not None and done >= once:
             return
         while not watched.has_changed():
+            if stdout_problem() is not None:
+                return  # Nobody looks any more.
             time.sleep(POLL)
         watched.take()
 

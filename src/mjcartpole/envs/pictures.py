@@ -37,11 +37,11 @@ class Pictures:
 
     def draw(self, cartpole: CartPole, state: npt.ArrayLike) -> npt.NDArray[np.uint8]:
         """A picture of a state, shape (height, width, 3)."""
-        if self._renderer is None:
-            self._renderer = open_renderer(
-                cartpole, width=self._width, height=self._height, camera=self._camera
-            )
-        return self._renderer.render(state)
+        # Held by a name of its own: another thread may close it meanwhile.
+        renderer = self._renderer = self._renderer or open_renderer(
+            cartpole, width=self._width, height=self._height, camera=self._camera
+        )
+        return renderer.render(state)
 
     def show(self, cartpole: CartPole, state: npt.NDArray[np.float64]) -> None:
         """Show a state in the window."""

@@ -341,9 +341,8 @@ class CartPoleVectorEnv(
             return None
         if not self._has_state:
             return None
-        if self._renderer is None:
-            self._renderer = self._open_renderer()
-        return tuple(self._renderer.render(state) for state in self._simulation.state)
+        renderer = self._renderer = self._renderer or self._open_renderer()
+        return tuple(renderer.render(state) for state in self._simulation.state)
 
     def close(self, **kwargs: object) -> None:
         """Free the renderer, if there is one."""

@@ -313,7 +313,8 @@ def _compile(text: str, name: str, path: Path | None = None) -> mujoco.MjModel:
     try:
         if path is None:
             return mujoco.MjModel.from_xml_string(text)
-        return mujoco.MjModel.from_xml_path(str(path))
+        # As bytes: a name need not be text.
+        return mujoco.MjModel.from_xml_path(os.fsencode(path))
     except (ValueError, mujoco.FatalError) as error:
         raise ModelSyntaxError(f"{name} is not a valid MJCF: {_one_line(error)}") from error
 

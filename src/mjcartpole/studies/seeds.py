@@ -6,6 +6,7 @@ import dataclasses
 import multiprocessing
 import os
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -177,13 +178,15 @@ class Crew:
     def _in_processes(self, stop: Callable[[], bool]) -> Iterator[SeedResult | None]:
         # A fresh interpreter each: nothing of OpenGL or threads is inherited.
         spawn = multiprocessing.get_context("spawn")
-        stopped = spawn.Event()
+        with _signals_for_parent():
+            stopped = spawn.Event()
         with concurrent.futures.ProcessPoolExecutor(
             self.workers, mp_context=spawn, initializer=_begin_worker, initargs=(stopped,)
         ) as pool:
-            futures = {
-                pool.submit(_train_seed_in_worker, job): job.config.seed for job in self._jobs
-            }
+            with _signals_for_parent():
+                futures = {
+                    pool.submit(_train_seed_in_worker, job): job.config.seed for job in self._jobs
+                }
             try:
                 for found in _as_they_come(futures):
                     if stop():
@@ -211,6 +214,23 @@ def _result_of(future: "concurrent.futures.Future[SeedResult]", seed: int) -> Se
     except (concurrent.futures.BrokenExecutor, OSError) as error:
         # A worker process was killed from outside, or there is no memory for one.
         return SeedResult(seed, error=f"its process ended: {error}")
+
+
+@contextlib.contextmanager
+def _signals_for_parent() -> Iterator[None]:
+    """Have processes that are started inside never see signals that end a job.
+
+    A terminal, and `timeout`, send them to all processes of a job.
+    """
+    if sys.platform == "win32":
+        yield
+        return
+    ending = {signal.SIGINT, signal.SIGTERM, signal.SIGHUP}
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, ending)
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 _stopped: Event | None = None
