@@ -291,9 +291,9 @@ def test_a_folder_that_nobody_can_write_is_one_line(runs, capsys):
     )
 
 
-def start_long(runs, name, **options):
+def start_long(runs, name, *more, **options):
     """Start a film of a thousand frames per control step."""
-    flags = ["-o", f"out/{name}", "--speed", "0.001", *SMALL]
+    flags = ["-o", f"out/{name}", "--speed", "0.001", *SMALL, *more]
     command = [sys.executable, "-m", "mjcartpole", "render", str(runs / "mujoco"), *flags]
     return subprocess.Popen(command, **options)
 
@@ -326,7 +326,7 @@ def test_an_interrupted_film_leaves_nothing(runs, here, name, number, code):
 def test_an_interrupted_mp4_leaves_the_old_one(runs, here, number, code):
     (here / "out").mkdir()
     (here / "out" / "out.mp4").write_bytes(b"old")
-    with start_long(runs, "out.mp4", stderr=subprocess.PIPE, text=True) as process:
+    with start_long(runs, "out.mp4", "--overwrite", stderr=subprocess.PIPE, text=True) as process:
         until = time.monotonic() + 60
         while len(list((here / "out").iterdir())) == 1 and time.monotonic() < until:
             time.sleep(0.01)

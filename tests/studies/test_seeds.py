@@ -26,7 +26,7 @@ def assert_as_alone(many, config):
         played = evaluate(
             alone.policy, backend=config.backend, model=config.model, integrator=config.integrator
         )
-        assert found.evaluation == played.summary()
+        assert found.evaluation == played
         assert found.score == played.returns.mean()
 
 
@@ -58,7 +58,7 @@ def test_seeds_are_taken_as_they_are_given():
 
 def test_the_figures_are_those_of_the_scores():
     many = train_many(CONFIG, 5)
-    scores = [found.evaluation["mean"] for found in many.seeds]
+    scores = [found.evaluation.mean for found in many.seeds]
     assert many.scores == scores
     assert many.failed == []
     figures = many.aggregate()
