@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import imageio_ffmpeg
 import numpy as np
@@ -227,6 +228,33 @@ def test_a_pictures_odd_size_stays(runs, capsys):
     assert "161x121" in out
     with Image.open("p/000000.png") as image:
         assert image.size == (161, 121)
+
+
+def test_a_film_is_never_replaced_unasked(runs, capsys):
+    first = render([runs / "mujoco"], capsys)
+    again = render([runs / "mujoco", "--backend", "gym"], capsys)
+    assert "  videos/mujoco.mp4  " in first
+    assert "  videos/mujoco-2.mp4  " in again
+    before = {path: path.read_bytes() for path in Path("videos").iterdir()}
+    for output in ("videos/mujoco.mp4", "pictures", "sheet.png"):
+        sheet = ["--sheet"] if output.endswith("png") else []
+        arguments = [runs / "mujoco", "-o", output, *sheet]
+        if not output.endswith("mp4"):
+            render(arguments, capsys)
+        code, out, err = call(["render", *arguments, *SMALL], capsys)
+        assert (code, out) == (2, "")
+        expected = f"'{output}' exists; choose another -o, or replace it with --overwrite"
+        assert err == f"mjcartpole: error: {expected}\n"
+        render([*arguments, "--overwrite", "--seed", "3"], capsys)
+    after = {path: path.read_bytes() for path in Path("videos").iterdir()}
+    assert [path.name for path in before if before[path] != after[path]] == ["mujoco.mp4"]
+    assert "  videos/mujoco.mp4  " in render([runs / "mujoco", "--overwrite"], capsys)
+
+
+def test_a_long_name_is_cut(runs, capsys):
+    copy = shutil.copytree(runs / "mujoco", runs / ("y" * 255), dirs_exist_ok=True)
+    assert re.search(r"  videos/y{200,}-[0-9a-f]{8}\.mp4  ", render([copy], capsys))
+    assert re.search(r"  videos/y+-[0-9a-f]{8}-beside-", render([copy] * 3, capsys))
 
 
 MISTAKES = [

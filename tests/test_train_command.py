@@ -954,7 +954,7 @@ def test_what_training_prints(here, capsys):
     for end, block in ((10, returns[:10]), (20, returns[10:20]), (25, returns[20:])):
         assert re.search(rf"^\s+{end}\s+{block.mean():.1f}$", out, re.M)
     assert "run    runs/tuned-mujoco-episodes25-log_every10-seed0" in out
-    assert (here / "runs" / "tuned-mujoco-seed0" / "summary.json").is_file()
+    assert (here / "runs" / "tuned-mujoco-episodes25-log_every10-seed0" / "summary.json").is_file()
     assert not (here / "videos").exists()
 
 

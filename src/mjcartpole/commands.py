@@ -118,12 +118,12 @@ def set_stage(source: Path, choice: Choice) -> Stage:
     integrator: Integrator
     if source.is_file():
         # Every run's own is called policy.json: its folder tells them apart.
-        name = source.resolve().parent.name if source.name == runs.POLICY else source.stem
+        name = _run_name(source.parent) if source.name == runs.POLICY else source.stem
         policy = Policy.load(source)
         backend, integrator, model, own_timestep = "mujoco", "gym", "cartpole", False
     else:
         run = runs.load_run(source)
-        name, policy = run.folder.resolve().name, run.policy
+        name, policy = _run_name(run.folder), run.policy
         backend, integrator = run.config.backend, run.config.integrator
         model, own_timestep = str(run.model), run.config.own_timestep
     backend = choice.backend or backend
@@ -137,6 +137,12 @@ def set_stage(source: Path, choice: Choice) -> Stage:
     if choice.set or own_timestep:
         played_on = load_model(model, choice.set, own_timestep=own_timestep)
     return Stage(name, policy, backend, played_on, integrator, seed)
+
+
+def _run_name(folder: Path) -> str:
+    """A run's name; a seed's among many begins with theirs."""
+    path = folder.resolve()
+    return f"{path.parent.name}-{path.name}" if seed_runs.is_seeds(path.parent) else path.name
 
 
 def _evaluate(stage: Stage, episodes: int) -> Evaluation:

@@ -71,7 +71,8 @@ def test_a_number_is_never_cut():
     )
     name = run_name("tuned", config)
     assert re.fullmatch(
-        r"tuned-mujoco-low-2.25_-1.0625_-0.25_-1.5-gamma0.5-alpha0.25-[0-9a-f]{8}-seed0", name
+        r"tuned-mujoco-low-2.25_-1.0625_-0.25_-1.5-high2.25_1.0625_0.25_1.25-[0-9a-f]{8}-seed0",
+        name,
     )
 
 

@@ -11,7 +11,7 @@ from mjcartpole.learning.training import train
 from mjcartpole.physics.model import load_model
 from mjcartpole.studies.evaluation import evaluate
 from mjcartpole.studies.many import train_many
-from mjcartpole.studies.seeds import Crew, available_cores
+from mjcartpole.studies.seeds import Crew, ManyResult, SeedResult, available_cores
 
 CONFIG = TrainConfig(episodes=15, backend="gym", seed=4)
 
@@ -142,3 +142,14 @@ def test_an_unknown_engine_or_model_is_refused_before_any_work():
 def test_no_more_workers_than_seeds():
     assert Crew(CONFIG, 2, load_model(), workers=9).workers == 2
     assert 1 <= Crew(CONFIG, 999, load_model()).workers == available_cores()
+
+
+def test_what_a_notebook_shows_is_short():
+    many = train_many(TrainConfig(backend="gym", episodes=5), seeds=3)
+    scores = many.scores
+    figures = f"mean {sum(scores) / 3:.2f}, least {min(scores):.2f}"
+    assert repr(many) == f"ManyResult(3 of 3 seeds evaluated, {figures})"
+    assert repr(many.seeds[1]) == f"SeedResult(1: {many.seeds[1].evaluation!r})"
+    assert repr(SeedResult(7, error="it fell")) == "SeedResult(7: it fell)"
+    nothing = ManyResult(many.config, (SeedResult(7),))
+    assert repr(nothing) == "ManyResult(0 of 1 seeds evaluated)"
