@@ -390,7 +390,7 @@ def test_a_seed_without_a_policy_is_named_and_left_out(seeds, capsys):
     (seeds / "seed-1" / "policy.json").unlink()
     for command in (["evaluate"], ["transfer", "--models", "gym", "--episodes", "2"]):
         code, out, err = call([command[0], "runs/many", *command[1:]], capsys)
-        said = "mjcartpole: 1 of 3 seeds in runs/many have no policy, such as seed 1: left out\n"
+        said = "mjcartpole: 1 of 3 seeds in runs/many without a policy, such as seed 1: left out\n"
         assert (code, err) == (0, said)
         assert "2 seeds" in out
     for seed in (0, 2):

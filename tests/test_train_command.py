@@ -1084,6 +1084,15 @@ def test_a_terminal_is_told_of_compiling_and_of_the_speed_without_it(here):
     assert json.loads(Path("run/timing.json").read_text())["training_seconds"] < 0.5
 
 
+def test_a_training_that_is_refused_leaves_nothing(here, capsys):
+    assert call([*NINE, "--run-dir", "run"], capsys)[0] == 0
+    code, out, err = call([*FILM, "run"], capsys)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert names(".") == ["run"]
+    os.chdir("run")
+    assert call(["train", "--resume", "."], capsys)[1] == ". is complete: nothing is left to do\n"
+
+
 def test_an_unwritable_videos_folder_is_noticed_before_training(here, capsys):
     (here / "videos").write_text("a file in the way")
     code, out, err = call(["train"], capsys)

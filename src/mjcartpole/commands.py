@@ -64,7 +64,7 @@ def _evaluate_seeds(source: Path, choice: Choice, episodes: int, as_json: bool) 
         return 0
     print(
         f"\ngreedy evaluation on {first.backend}{_chosen_model(first, choice)}: "
-        f"{len(found)} seeds, {episodes:,} episodes each, seed {first.seed}\n"
+        f"{counted(len(found), 'seed')}, {counted(episodes, 'episode')} each, seed {first.seed}\n"
     )
     print_seeds(many)
     return 0
@@ -79,7 +79,7 @@ def learned_seeds(folder: Path) -> dict[int, Path]:
     learned, without = seed_runs.learned_seeds(folder)
     if without:
         count, all_seeds = len(without), len(without) + len(learned)
-        which = f"{count} of {all_seeds} seeds in {folder} have no policy"
+        which = f"{count} of {all_seeds} seeds in {folder} without a policy"
         print(f"mjcartpole: {which}, such as seed {without[0]}: left out", file=sys.stderr)
     return learned
 
@@ -156,6 +156,11 @@ def _evaluate(stage: Stage, episodes: int) -> Evaluation:
     )
 
 
+def counted(count: int, what: str) -> str:
+    """A number of things in words: 1 episode, 2 episodes."""
+    return f"{count:,} {what}" if count == 1 else f"{count:,} {what}s"
+
+
 def print_evaluation(result: Evaluation, where: str = "") -> None:
     """Print mean, minimum, and how the episodes ended.
 
@@ -164,8 +169,8 @@ def print_evaluation(result: Evaluation, where: str = "") -> None:
         where: What else is to be said of where.
     """
     print(
-        f"\ngreedy evaluation on {result.backend}{where}: {len(result.episodes)} episodes, "
-        f"seed {result.seed}\n"
+        f"\ngreedy evaluation on {result.backend}{where}: "
+        f"{counted(len(result.episodes), 'episode')}, seed {result.seed}\n"
         f"  mean return {result.mean:.2f}, minimum {result.minimum:.0f}"
     )
     for ending, count in result.endings.items():

@@ -10,7 +10,7 @@ from PIL import Image
 from rich.console import Console
 from rich.progress import Progress
 
-from mjcartpole.commands import VIDEOS, Choice, median_seed, set_stage
+from mjcartpole.commands import VIDEOS, Choice, counted, median_seed, set_stage
 from mjcartpole.errors import FileError, RenderError, RunError
 from mjcartpole.files import check_free, check_writable, free_path, replacing
 from mjcartpole.learning import runs
@@ -78,7 +78,7 @@ def _shown(source: Path) -> Path:
     if not seed_runs.is_seeds(source):
         return source
     folder, count = median_seed(source)
-    print(f"{folder}  (the median of {count} seeds by mean greedy return)", flush=True)
+    print(f"{folder}  (the median of {counted(count, 'seed')} by mean greedy return)", flush=True)
     return folder
 
 
@@ -191,7 +191,7 @@ def _raise_noted(signals: StopSignals) -> None:
 def _what_happened(casts: Sequence[Sequence[Take]]) -> str:
     takes = [take for takes in casts for take in takes]
     if len(takes) == 1:
-        return f"{takes[0].episode.steps} steps, {takes[0].episode.ending}"
+        return f"{counted(takes[0].episode.steps, 'step')}, {takes[0].episode.ending}"
     steps = [take.episode.steps for take in takes]
     return f"{len(takes)} episodes of {min(steps)} to {max(steps)} steps"
 

@@ -18,7 +18,7 @@ from rich.progress import (
 )
 from rich.text import Text
 
-from mjcartpole.commands import RUNS, VIDEOS, print_evaluation, print_seeds
+from mjcartpole.commands import RUNS, VIDEOS, counted, print_evaluation, print_seeds
 from mjcartpole.errors import ConfigError
 from mjcartpole.files import check_writable, make_folder
 from mjcartpole.learning import runs, tensorboard
@@ -98,14 +98,14 @@ def run_train(config: TrainConfig, how: How, where: Where) -> int:
     """
     cartpole = _prepare(config, how)
     folder, preset = where.folder(config), where.preset
-    if how.video:
-        check_writable(make_folder(VIDEOS))
     signals = StopSignals()
     with signals.caught(), runs.claimed_folder(folder, overwrite=where.overwrite):
+        if how.video:
+            check_writable(make_folder(VIDEOS))
         training = Training(config, engine=how.engine, cartpole=cartpole)
         print(
-            f"{preset} on {config.backend}: {config.episodes:,} episodes, seed {config.seed}"
-            + where.about(folder, config),
+            f"{preset} on {config.backend}: {counted(config.episodes, 'episode')}, "
+            f"seed {config.seed}" + where.about(folder, config),
             flush=True,
         )
         remove_film(folder)
@@ -141,7 +141,8 @@ def run_resume(path: Path, how: How) -> int:
         session.resume(begun.checkpoint)
         print(
             f"{begun.preset} on {config.backend}: goes on after {len(training.log):,} of "
-            f"{config.episodes:,} episodes, seed {config.seed}{_changes(begun.preset, config)}",
+            f"{counted(config.episodes, 'episode')}, seed {config.seed}"
+            f"{_changes(begun.preset, config)}",
             flush=True,
         )
         _conduct(session, folder, begun.cartpole, begun.preset, how, signals)
@@ -219,8 +220,8 @@ def _conduct(
         runs.finish_run(folder)
     except Interrupted as interrupted:
         raise Interrupted(
-            f"interrupted after {len(session.training.log):,} of {config.episodes:,} episodes"
-            + _kept(folder),
+            f"interrupted after {len(session.training.log):,} of "
+            f"{counted(config.episodes, 'episode')}" + _kept(folder),
             signals.number,
         ) from interrupted
 
@@ -296,8 +297,8 @@ def _conduct_seeds(
 ) -> int:
     """Train all seeds or to a signal; write and print."""
     print(
-        f"{preset} on {config.backend}: {len(crew.seeds)} seeds from {crew.seeds[0]}, "
-        f"{config.episodes:,} episodes each, {crew.workers} at once{about}\n",
+        f"{preset} on {config.backend}: {counted(len(crew.seeds), 'seed')} from {crew.seeds[0]}, "
+        f"{counted(config.episodes, 'episode')} each, {crew.workers} at once{about}\n",
         flush=True,
     )
     columns = (_Doing(), BarColumn(), MofNCompleteColumn(), TextColumn("seeds"))
