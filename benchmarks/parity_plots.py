@@ -14,7 +14,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from mjcartpole.files import make_folder
-from mjcartpole.physics import equations, linear
+from mjcartpole.physics import linear
 from mjcartpole.physics.model import load_model
 from mjcartpole.studies.parity import Subject
 from mjcartpole.studies.parity.convergence import METHODS, energy_track

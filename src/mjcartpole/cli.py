@@ -10,6 +10,7 @@ import dataclasses
 import io
 import json
 import logging
+import os
 import re
 import sys
 from collections.abc import Callable, Sequence
@@ -39,6 +40,7 @@ FAILED = 2
 INTERRUPTED = 130
 _DASHED_FILE = re.compile(r"-(?!-|o=).+\.(mp4|gif|webp|png|xml|json)")
 """A file whose name begins with a dash: no flag with a single one looks like this."""
+_LISTS = ("--bins", "--low", "--high", "--rungs", "--models")
 COMMANDS = ("train", "evaluate", "render", "parity", "doctor", "model", "transfer", "watch")
 
 
@@ -168,6 +170,7 @@ def _transfer(command: Transfer) -> int:
         seed=command.seed,
         workers=command.workers,
         output=command.output,
+        overwrite=command.overwrite,
     )
 
 
@@ -231,6 +234,7 @@ def _render(command: Render) -> int:
         episodes=command.episodes,
         output=command.output,
         sheet=command.sheet,
+        overwrite=command.overwrite,
     )
 
 
@@ -285,7 +289,8 @@ def parse(argv: Sequence[str]) -> Command:
         UsageError: A word of it is not understood.
         SystemExit: With code 0, after `--help`.
     """
-    argv = _gather_edits([f"./{word}" if _DASHED_FILE.fullmatch(word) else word for word in argv])
+    argv = [f"./{word}" if _DASHED_FILE.fullmatch(word) else word for word in argv]
+    argv = _split_lists(_gather_edits(argv))
     preset = _preset_in(argv)
     train_default = Train(config=TrainConfig.preset(preset), preset=preset)
     grammar = (
@@ -305,7 +310,8 @@ def parse(argv: Sequence[str]) -> Command:
                 grammar,
                 args=list(argv),
                 prog="mjcartpole",
-                description="CartPole-v1 as real physics: train a Q-table, evaluate it, film it.",
+                description="CartPole-v1 as real physics: train a Q-table, evaluate it, film it. "
+                "mjcartpole --version prints the version.",
             )
     except SystemExit as stop:
         if not stop.code:
@@ -322,16 +328,41 @@ def _gather_edits(argv: Sequence[str]) -> list[str]:
     words, edits, follows, first = [], list[str](), False, False
     for word in argv:
         if word == "--set" or word.startswith("--set="):
-            edits += [word.removeprefix("--set=")] if "=" in word else []
+            edits += _split_edits(word.removeprefix("--set=")) if "=" in word else []
             follows, first = True, "=" not in word
         elif follows and (first or "=" in word) and not word.startswith("-"):
             # The first one is meant as an edit, even where it is none.
-            edits.append(word)
+            edits += _split_edits(word)
             first = False
         else:
             follows = False
             words.append(word)
     return [*words, "--set", *edits] if edits else words
+
+
+def _split_edits(word: str) -> list[str]:
+    """The edits of a word, which may have commas between them: a.b=1,c.d=2."""
+    return re.split(r",(?=[\w.:]+=)", word)
+
+
+def _split_lists(argv: Sequence[str]) -> list[str]:
+    """Take the values of a flag that has several with commas too: 1,3,6,8 as 1 3 6 8."""
+    words, follows = list[str](), False
+    for word in argv:
+        flag, _, value = word.partition("=")
+        if flag in _LISTS:
+            follows = True
+            words += [flag, *_split_values(value)]
+        else:
+            follows = follows and not re.match(r"--|-[A-Za-z]$", word)
+            words += _split_values(word) if follows else [word]
+    return words
+
+
+def _split_values(word: str) -> list[str]:
+    if os.path.exists(word):  # noqa: PTH110 - a Path raises where a name is too long
+        return [word]
+    return [value for value in re.split(r"[,\s]+", word) if value]
 
 
 def _preset_in(argv: Sequence[str]) -> str:

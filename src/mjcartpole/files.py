@@ -4,7 +4,7 @@ import contextlib
 import functools
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from mjcartpole.errors import FileError
@@ -66,6 +66,31 @@ def check_writable(folder: Path) -> None:
     """
     with _temporary(folder / "probe"):
         pass
+
+
+def check_free(paths: Sequence[Path]) -> None:
+    """Refuse to replace what is there already; an empty folder is nothing.
+
+    Raises:
+        FileError: One of them is there.
+    """
+    for path in paths:
+        if os.path.lexists(path) and not (path.is_dir() and not any(path.iterdir())):
+            raise FileError(f"'{path}' exists; choose another -o, or replace it with --overwrite")
+
+
+def free_path(path: Path, suffixes: Sequence[str] = ()) -> Path:
+    """The first of `a.mp4`, `a-2.mp4`, `a-3.mp4` … that is not there.
+
+    Args:
+        path: The first.
+        suffixes: What belongs to it: none of these is there beside it either.
+    """
+    stem, free, number = path.with_suffix(""), path, 1
+    while any(os.path.lexists(free.with_suffix(suffix)) for suffix in (path.suffix, *suffixes)):
+        number += 1
+        free = stem.with_name(f"{stem.name}-{number}{path.suffix}")
+    return free
 
 
 def remove_leftovers(folder: Path) -> None:

@@ -288,12 +288,9 @@ def _verdicts(results: list[Result]) -> str:
 def _train(config: TrainConfig, cartpole: CartPole, check: Callable[[], None]) -> TrainResult:
     """Train; with fewer episodes where this model would take too long."""
     training = Training(config, cartpole=cartpole)
-    first: TrainResult | None = None
     for _ in training.run():
         check()
-        now = training.result()
-        first = first or now
-        episodes = _affordable(first, now)
+        episodes = _affordable(training.result())
         if episodes < config.episodes:
             _say("training", f"{episodes:,} episodes instead of {config.episodes:,}: it is slow")
             training = Training(dataclasses.replace(config, episodes=episodes), cartpole=cartpole)
@@ -310,18 +307,12 @@ def _train(config: TrainConfig, cartpole: CartPole, check: Callable[[], None]) -
     return result
 
 
-def _affordable(first: TrainResult, now: TrainResult) -> int:
-    """How many episodes there is time for, should all of them last to the time limit.
-
-    Args:
-        first: After the first chunk, in which the loop may have been compiled.
-        now: After a later one.
-    """
+def _affordable(now: TrainResult) -> int:
+    """How many episodes there is time for, should all of them last to the time limit."""
     asked = now.config.episodes
-    seconds, steps = now.seconds - first.seconds, now.steps - first.steps
-    if seconds < _TRIAL or not steps:
+    if now.seconds < _TRIAL:
         return asked
-    seconds_per_episode = seconds / steps * TIME_LIMIT
+    seconds_per_episode = now.seconds / now.steps * TIME_LIMIT
     left = asked - len(now.returns)
     if now.seconds + left * seconds_per_episode <= PATIENCE:
         return asked

@@ -295,3 +295,9 @@ def test_a_file_may_have_any_ending_but_a_shipped_name_comes_first(tmp_path, mon
         (tmp_path / name).write_text(changed("-9.8", "-1.62"), encoding="utf-8")
     assert load_model("mine.mjcf").model.opt.gravity[2] == -1.62
     assert load_model("cartpole").model.opt.gravity[2] == -9.8
+
+
+def test_what_a_notebook_shows_is_short():
+    assert repr(load_model("twopoles")) == "CartPole('twopoles', 2 poles, timestep 0.02 s)"
+    edited = load_model("cartpole", {"pole.length": 1.5})
+    assert repr(edited) == "CartPole('cartpole with pole.length=1.5', 1 pole, timestep 0.02 s)"

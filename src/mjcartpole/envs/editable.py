@@ -11,7 +11,7 @@ from mjcartpole.physics.model import INTEGRATORS, CartPole, Edits, load_shared, 
 from mjcartpole.physics.simulation import Simulation
 
 KINEMATICS: Final = {"euler": "", "semi-implicit": "Euler"} | {
-    name: name for name in INTEGRATORS if name != "Euler"
+    name: name for name in INTEGRATORS.values() if name != "Euler"
 }
 """CartPole-v1's words for an integrator, and the file's own beside them, to MJCF's."""
 

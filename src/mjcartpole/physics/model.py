@@ -44,7 +44,7 @@ INTEGRATORS = {
 """MuJoCo's integrators by its own numbers, spelled as MJCF spells them."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class CartPole:
     """A compiled cart-pole and where its parts are.
 
@@ -68,6 +68,10 @@ class CartPole:
     controls: tuple[float, float]
     substeps: int
     upright: tuple[float, ...]
+
+    def __repr__(self) -> str:
+        name = self.name if len(self.name) <= 200 else f"{self.name[:200]}…"
+        return f"CartPole({name!r}, {task.in_words(self.poles)}, timestep {self.timestep:g} s)"
 
     @property
     def poles(self) -> int:
