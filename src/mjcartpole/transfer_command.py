@@ -42,6 +42,7 @@ def run_transfer(
     seed: int = SEED,
     workers: int | None = None,
     output: Path = TRANSFER,
+    allow_assets: tuple[Path, ...] = (),
 ) -> int:
     """Play policies on models they were not trained on, print and write. Returns the exit code.
 
@@ -58,12 +59,14 @@ def run_transfer(
         seed: Seeds the starting states.
         workers: How many evaluations at once; as many as there are cores if left out.
         output: Folder for the CSV, JSON and PNG.
+        allow_assets: Other folders than a run's own in which the files of its model may lie.
 
     Raises:
         MjCartPoleError: Something cannot be used; nothing has been played then.
     """
     silence_mujoco()
-    policies = _find_policies(sources)
+    choice = Choice(allow_assets=allow_assets)
+    policies = _find_policies(sources, choice)
     physics: dict[str, Any] = {"integrator": integrator, "own_timestep": own_timestep}
     settings: dict[str, Any] = {"episodes": episodes, "seed": seed, "workers": workers}
     if swept is None:
@@ -78,7 +81,7 @@ def run_transfer(
     key, values = parse_sweep(swept)
     if len(models) > 1:
         raise ConfigError(f"a sweep edits one model, not {len(models)}; give one, or no --sweep")
-    model = models[0] if models else set_stage(sources[0], Choice()).model
+    model = models[0] if models else set_stage(sources[0], choice).model
     check_writable(make_folder(output))
     curve = sweep(policies, model, key, values, edits=edits, **physics, **settings)
     _print_sweep(curve)
@@ -94,11 +97,11 @@ def _fitting(policies: Mapping[str, Policy]) -> list[str]:
     return [name for name in (GYM, *model_names()) if find_place(name).poles in poles]
 
 
-def _find_policies(sources: Sequence[Path]) -> dict[str, Policy]:
+def _find_policies(sources: Sequence[Path], choice: Choice) -> dict[str, Policy]:
     """Policies by name; those of one name are called by their paths."""
     if not sources:
         raise ConfigError("transfer needs a RUN-OR-POLICY, or several")
-    stages = {source: set_stage(source, Choice()) for source in sources}
+    stages = {source: set_stage(source, choice) for source in sources}
     count = Counter(stage.name for stage in stages.values())
     return {
         stage.name if count[stage.name] == 1 else str(source): stage.policy

@@ -7,8 +7,9 @@ that pushes along the slider. Names do not matter; structure does.
 import copy
 import dataclasses
 import difflib
+import functools
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeAlias
@@ -18,7 +19,8 @@ import numpy as np
 
 from mjcartpole import task
 from mjcartpole.errors import ConfigError, ModelNotFoundError, ModelSyntaxError
-from mjcartpole.physics.reading import read_text, stand_alone
+from mjcartpole.physics.guard import compile_document, one_line
+from mjcartpole.physics.reading import portable, read_text, read_whole
 from mjcartpole.physics.soundness import check_motion, check_numbers
 from mjcartpole.physics.structure import (
     check_directions,
@@ -58,6 +60,11 @@ class CartPole:
     controls: tuple[float, float]
     substeps: int
     upright: tuple[float, ...]
+
+    @functools.cached_property
+    def stored(self) -> tuple[str, dict[str, Path | str]]:
+        """The document as a run stores it, and the files that lie beside it (see `portable`)."""
+        return portable(self.xml)
 
     @property
     def poles(self) -> int:
@@ -141,7 +148,7 @@ def load_model(
         return load_named(source, "the XML document", own_timestep=own_timestep)
     path = find_model(source)
     name = path.stem if path.parent == models_folder() else str(source)
-    return _find_parts(name, *_from_file(path), own_timestep)
+    return _find_parts(name, *_compile(read_text(path), str(path), path.parent), own_timestep)
 
 
 def _load_edited(
@@ -165,7 +172,31 @@ def load_named(document: str, name: str, *, own_timestep: bool = True) -> CartPo
     Raises:
         ModelError: It does not load, or is no cart-pole.
     """
-    return _find_parts(name, *_from_text(document, name), own_timestep)
+    return _find_parts(name, *_compile(document, name, Path()), own_timestep)
+
+
+def load_stored(
+    document: str,
+    name: str,
+    folder: Path,
+    allow_assets: Sequence[Path] = (),
+    *,
+    own_timestep: bool = False,
+) -> CartPole:
+    """Load a document that a run stores, which may have been made by somebody else.
+
+    Args:
+        document: The document.
+        name: What a person calls it.
+        folder: The run's folder; what the document names must lie in there.
+        allow_assets: Other folders in which it may lie.
+        own_timestep: See `load_model`.
+
+    Raises:
+        ModelError: It does not load, is no cart-pole, or names a file elsewhere.
+    """
+    inside = (folder, *allow_assets)
+    return _find_parts(name, *_compile(document, name, folder, inside), own_timestep)
 
 
 def with_options(
@@ -218,55 +249,44 @@ def find_model(source: str | os.PathLike[str]) -> Path:
     )
 
 
-def _from_file(path: Path) -> tuple[str, mujoco.MjModel]:
-    """The document, whole, and the compiled model."""
-    xml = stand_alone(read_text(path), str(path), path.parent)
-    # By a relative path MuJoCo does not find all files of included files, and the compiled model
-    # holds the paths of its files.
-    return xml, _compile(xml, str(path), path.parent.resolve() / path.name)
-
-
-def _from_text(text: str, name: str) -> tuple[str, mujoco.MjModel]:
-    """The document, whole, and the compiled model; its files are sought where the program runs."""
-    xml = stand_alone(text, name, Path())
-    return xml, _compile(xml, name)
-
-
 def _from_spec(spec: mujoco.MjSpec) -> tuple[str, str, mujoco.MjModel]:
     """Its name, the document and the compiled model."""
     try:
         model = spec.compile()
     except (ValueError, mujoco.FatalError) as error:
-        raise ModelSyntaxError(f"the MjSpec does not compile: {_one_line(error)}") from error
+        raise ModelSyntaxError(f"the MjSpec does not compile: {one_line(str(error))}") from error
     # MuJoCo writes numbers with six digits: this text is for reading, `model` is what runs.
-    xml = stand_alone(spec.to_xml(), "the MjSpec", Path(spec.modelfiledir))
+    xml = read_whole(spec.to_xml(), "the MjSpec", Path(spec.modelfiledir)).text
     return spec.modelname or "the MjSpec", xml, model
 
 
-def _compile(text: str, name: str, path: Path | None = None) -> mujoco.MjModel:
-    """Compile a document; a path lets it refer to other files beside it."""
-    try:
-        if path is None:
-            return mujoco.MjModel.from_xml_string(text)
-        return mujoco.MjModel.from_xml_path(str(path))
-    except (ValueError, mujoco.FatalError) as error:
-        raise ModelSyntaxError(f"{name} is not a valid MJCF: {_one_line(error)}") from error
-
-
-def _one_line(error: Exception) -> str:
-    message = " ".join(str(error).split())
-    return message.removeprefix("XML Error: ").removeprefix("Error: ")
+def _compile(
+    text: str, name: str, folder: Path, inside: Sequence[Path] | None = None
+) -> tuple[str, mujoco.MjModel]:
+    """The document, whole, and the compiled model."""
+    document = read_whole(text, name, folder, inside)
+    return document.text, compile_document(document, name)
 
 
 def same_model(a: mujoco.MjModel, b: mujoco.MjModel) -> bool:
-    """Whether two compiled models are equal in every number, name and option."""
-    return _bytes_of(a) == _bytes_of(b)
+    """Whether two compiled models are equal in every number, name and option.
+
+    Where their files lie makes no difference.
+    """
+    return dict(_values_of(a)) == dict(_values_of(b))
 
 
-def _bytes_of(model: mujoco.MjModel) -> bytes:
-    buffer = np.empty(mujoco.mj_sizeModel(model), dtype=np.uint8)
-    mujoco.mj_saveModel(model, None, buffer)
-    return buffer.tobytes()
+def _values_of(part: object, prefix: str = "") -> Iterator[tuple[str, object]]:
+    for name in dir(part):
+        value = getattr(part, name)
+        if name.startswith("_") or callable(value) or "path" in name or name == "nbuffer":
+            continue
+        if isinstance(value, np.ndarray):
+            yield prefix + name, (value.shape, value.tobytes())
+        elif isinstance(value, int | float | bytes):
+            yield prefix + name, value
+        else:
+            yield from _values_of(value, f"{prefix}{name}.")
 
 
 def self_contained(text: str, folder: Path) -> str:
@@ -278,7 +298,7 @@ def self_contained(text: str, folder: Path) -> str:
     Raises:
         ModelError: The document or an included file cannot be read.
     """
-    return stand_alone(text, "the XML document", folder)
+    return read_whole(text, "the XML document", folder).text
 
 
 def _find_parts(name: str, xml: str, model: mujoco.MjModel, own_timestep: bool) -> CartPole:

@@ -11,8 +11,14 @@ from mjcartpole import task
 from mjcartpole.errors import ModelError
 from mjcartpole.physics.bodies import HasJoints
 
-MOST_MEMORY: Final = 2**30
+MOST_MEMORY: Final = 2**29
 """Bytes that a model may ask for, for contacts and constraints."""
+
+LARGEST_MODEL: Final = 2**28
+"""Bytes of a compiled model, of which there are several copies in a process."""
+
+MOST_OBJECTS: Final = 5_000
+"""Bodies, joints, geoms, sites and all else that may have a name."""
 
 _MAY_BE_INFINITE: Final = {"jnt_range", "tendon_range"}
 """People write -inf and inf for a joint that turns freely; no limit is reached then."""
@@ -39,6 +45,16 @@ def check_numbers(name: str, model: mujoco.MjModel) -> None:
         raise ModelError(
             f"{name} asks for {model.narena / 2**20:.0f} MB of working memory; no more than "
             f"{MOST_MEMORY / 2**20:.0f} MB are given: look at memory, njmax and nconmax of <size>"
+        )
+    if model.nbuffer > LARGEST_MODEL:
+        raise ModelError(
+            f"{name} has {model.nbuffer / 2**20:.0f} MB once compiled; no more than "
+            f"{LARGEST_MODEL / 2**20:.0f} MB are taken: look at textures, meshes and height fields"
+        )
+    if (objects := model.nnames_map // 2) > MOST_OBJECTS:  # A map has twice as many places.
+        raise ModelError(
+            f"{name} has {objects:,} bodies, joints, geoms and other parts, copies included; no "
+            f"more than {MOST_OBJECTS:,} are taken, and a cart-pole needs a few dozen"
         )
     for field in ("iterations", "ls_iterations", "noslip_iterations", "ccd_iterations"):
         if getattr(model.opt, field) > MOST_ITERATIONS:
