@@ -205,7 +205,8 @@ def _has(asset: Path) -> bool:
 
 def remove_assets(folder: Path, keep: Iterable[str] = ()) -> None:
     """Remove the files that a model named, but for some."""
-    _remove(folder, {path.name for path in folder.iterdir() if is_stored(path.name)} - set(keep))
+    names = {path.name for path in folder.glob("asset-*") if is_stored(path.name)}
+    _remove(folder, names - set(keep))
 
 
 def write_results(folder: Path, result: TrainResult, summary: dict[str, Any]) -> None:

@@ -213,7 +213,7 @@ def _asset(
         first = _join(_sought(element.tag, folders.main, compilers), name)
         beside = _join(origin, name)
         tried += [first, beside]
-        path = usual if _is_there(first) else beside
+        path = usual if is_there(first) else beside
     return Asset(element, attribute, path, tuple(tried))
 
 
@@ -236,7 +236,8 @@ def _sought(tag: str, main: Path, compilers: list[dict[str, str]]) -> Path:
     return main / _plain(folder)
 
 
-def _is_there(path: Path) -> bool:
+def is_there(path: Path) -> bool:
+    """Whether a path leads to something."""
     try:
         path.stat()
     except (OSError, ValueError):

@@ -17,6 +17,7 @@ from mjcartpole.physics.assets import (
     Asset,
     Folders,
     find_assets,
+    is_there,
     name_by_content,
     store_names,
     strips,
@@ -192,10 +193,7 @@ class _Reader:
             )
         file = file.replace("\\", "/")
         usual, beside = self.folders.main / file, (origin or self.folders.main) / file
-        try:
-            return usual if usual.exists() or not beside.exists() else beside
-        except (OSError, ValueError):
-            return usual
+        return usual if is_there(usual) or not is_there(beside) else beside
 
     def _text(self, path: Path, who: str) -> str:
         if self.left <= 0:

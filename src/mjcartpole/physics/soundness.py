@@ -41,21 +41,22 @@ def check_numbers(name: str, model: mujoco.MjModel) -> None:
     Raises:
         ModelError: A number is NaN or infinite, or asks for endless work or memory.
     """
-    if model.narena > MOST_MEMORY:
-        raise ModelError(
-            f"{name} asks for {model.narena / 2**20:.0f} MB of working memory; no more than "
-            f"{MOST_MEMORY / 2**20:.0f} MB are given: look at memory, njmax and nconmax of <size>"
-        )
-    if model.nbuffer > LARGEST_MODEL:
-        raise ModelError(
-            f"{name} has {model.nbuffer / 2**20:.0f} MB once compiled; no more than "
-            f"{LARGEST_MODEL / 2**20:.0f} MB are taken: look at textures, meshes and height fields"
-        )
-    if (objects := model.nnames_map // 2) > MOST_OBJECTS:  # A map has twice as many places.
-        raise ModelError(
-            f"{name} has {objects:,} bodies, joints, geoms and other parts, copies included; no "
-            f"more than {MOST_OBJECTS:,} are taken, and a cart-pole needs a few dozen"
-        )
+    amounts = (
+        (
+            model.narena,
+            MOST_MEMORY,
+            "bytes of working memory",
+            "memory, njmax and nconmax of <size>",
+        ),
+        (model.nbuffer, LARGEST_MODEL, "bytes once compiled", "textures, meshes, height fields"),
+        # A map has twice as many places.
+        (model.nnames_map // 2, MOST_OBJECTS, "bodies, geoms and other parts", "counts"),
+    )
+    for amount, most, what, where in amounts:
+        if amount > most:
+            raise ModelError(
+                f"{name} has {amount:,} {what}; no more than {most:,} are taken: look at {where}"
+            )
     for field in ("iterations", "ls_iterations", "noslip_iterations", "ccd_iterations"):
         if getattr(model.opt, field) > MOST_ITERATIONS:
             raise ModelError(
