@@ -107,7 +107,10 @@ SLOW = {
             for i in range(20)
         )
     ),
-    "points": document('<mesh name="m" file="points.obj"/>'),
+    "points": document(
+        '<mesh name="m" file="points.obj"/>',
+        '<geom type="mesh" mesh="m" contype="1" conaffinity="1"/>',
+    ),
 }
 
 
