@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mjcartpole.envs.backend import Backend, check_backend
+from mjcartpole.files import is_file
 from mjcartpole.integrator import Integrator
 from mjcartpole.learning import runs
 from mjcartpole.learning.policy import Policy
@@ -49,7 +50,7 @@ def set_stage(source: Path, choice: Choice) -> Stage:
     check_count(1, seed)
     backend: Backend
     integrator: Integrator
-    if source.is_file():
+    if is_file(source):
         # Every run's own is called policy.json: its folder tells them apart.
         name = source.resolve().parent.name if source.name == runs.POLICY else source.stem
         policy = Policy.load(source)

@@ -23,7 +23,7 @@ from mjcartpole.learning import runs, tensorboard
 from mjcartpole.learning.checkpoints import LATEST
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.engine import Engine
-from mjcartpole.learning.folders import free_folder, locked_folder
+from mjcartpole.learning.folders import free_folder
 from mjcartpole.learning.session import CHECKPOINT_EVERY, Session, check_interval
 from mjcartpole.learning.training import Training, TrainResult
 from mjcartpole.physics.model import CartPole
@@ -111,14 +111,13 @@ def run_resume(path: Path, how: How) -> int:
     """
     silence_mujoco()
     _check(how)
-    if (path / seed_runs.SEEDS).is_file():
+    if seed_runs.SEEDS in runs.content_of(path):
         return _resume_seeds(path, how)
     if how.workers is not None:
         raise ConfigError("--workers is for several --seeds")
     folder = runs.run_folder(path)
-    if path.is_dir() and runs.is_complete(folder):
-        with locked_folder(folder):
-            pass  # A lock that a killed training has left goes.
+    if path == folder and runs.is_complete(folder):
+        runs.check_complete(folder)
         print(f"{folder} is complete: nothing is left to do")
         return 0
     signals = StopSignals()

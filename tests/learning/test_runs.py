@@ -14,6 +14,25 @@ from mjcartpole.learning.session import Session
 from mjcartpole.learning.training import Training, train
 from mjcartpole.physics.model import load_model, same_model
 
+SUMMARY = {
+    "preset": "article",
+    "backend": "mujoco",
+    "model": "cartpole",
+    "seed": 3,
+    "episodes": 12,
+    "interrupted": False,
+    "steps": 200,
+    "mean_return_last_100": 16.5,
+    "evaluation": {
+        "backend": "mujoco",
+        "seed": 1_000_000,
+        "episodes": 100,
+        "mean": 20.5,
+        "minimum": 9.0,
+        "endings": {"time limit": 0, "off the track": 1, "pole fell": 99},
+    },
+}
+
 
 @pytest.fixture(scope="module")
 def result():
@@ -25,7 +44,7 @@ def run(result, tmp_path):
     folder = tmp_path / "run"
     with runs.claimed_folder(folder):
         runs.begin_run(folder, result.config, load_model(), preset="article", video=True)
-        runs.write_results(folder, result, {"episodes": 12})
+        runs.write_results(folder, result, SUMMARY)
     return folder
 
 
@@ -215,12 +234,13 @@ def test_a_folder_is_locked_once(begun):
 
 def test_a_run_is_complete_when_its_checkpoints_are_gone(begun, result):
     assert not runs.is_complete(begun)
-    runs.write_results(begun, result, {"episodes": 12})
+    runs.write_results(begun, result, SUMMARY)
     assert not runs.is_complete(begun)
     runs.finish_run(begun)
     assert runs.is_complete(begun)
     assert sorted(path.name for path in begun.iterdir()) == sorted(runs.FILES)
-    assert runs.read_summary(begun) == {"episodes": 12}
+    assert runs.read_summary(begun) == SUMMARY
+    assert runs.check_complete(begun) == (result.config, SUMMARY["evaluation"])
     assert runs.load_run(begun).preset == "article"
 
 

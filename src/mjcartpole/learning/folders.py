@@ -1,6 +1,8 @@
 """Folders that one training holds at a time."""
 
 import contextlib
+import os
+import stat
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
@@ -8,9 +10,12 @@ from typing import Final
 import filelock
 
 from mjcartpole.errors import FileError, RunError
-from mjcartpole.files import check_writable, make_folder, remove_leftovers
+from mjcartpole.files import brief, make_folder, remove_leftovers
 
 LOCK: Final = ".lock"
+
+_TRIES: Final = 100
+"""How often a folder may vanish before it is locked."""
 
 
 def free_folder(parent: Path, name: str) -> Path:
@@ -30,11 +35,8 @@ def held_folder(folder: Path) -> Iterator[None]:
         RunError: Another training is at work in it.
         FileError: It cannot be made or written.
     """
-    make_folder(folder)
-    check_writable(folder)
     try:
-        with locked_folder(folder):
-            remove_leftovers(folder)
+        with locked_folder(folder, make=True):
             yield
     finally:
         with contextlib.suppress(OSError):
@@ -42,26 +44,58 @@ def held_folder(folder: Path) -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def locked_folder(folder: Path) -> Iterator[None]:
+def locked_folder(folder: Path, *, make: bool = False) -> Iterator[None]:
     """Keep other trainings out of a folder, for as long as this process lives.
 
+    What writers that were killed have left in it goes.
+
+    Args:
+        folder: Which.
+        make: Make it, if it is not there.
+
     Raises:
-        RunError: Another training is at work in it.
+        RunError: Another training is at work in it, or its lock is none of ours.
         FileError: The folder cannot be written.
     """
-    lock = filelock.FileLock(folder / LOCK)
+    lock = _acquired(folder, make)
     try:
-        lock.acquire(timeout=0)
-    except filelock.Timeout:
-        raise RunError(
-            f"run folder '{folder}' is in use by another training; wait for its end, or choose "
-            "another --run-dir"
-        ) from None
-    except OSError as error:
-        raise FileError(f"cannot lock '{folder}': {error.strerror or error}") from error
-    try:
+        remove_leftovers(folder)
         yield
     finally:
         with contextlib.suppress(OSError):
             (folder / LOCK).unlink()
         lock.release()
+
+
+def _acquired(folder: Path, make: bool) -> filelock.BaseFileLock:
+    lock = filelock.FileLock(folder / LOCK)
+    for left in reversed(range(_TRIES)):
+        if make:
+            make_folder(folder)
+        try:
+            _check_lock(folder / LOCK)
+            lock.acquire(timeout=0)
+        except filelock.Timeout:
+            raise RunError(
+                f"run folder '{folder}' is in use by another training; wait for its end, or choose "
+                "another --run-dir"
+            ) from None
+        except OSError as error:
+            # Another training may have ended right now, and its empty folder with it.
+            if isinstance(error, FileNotFoundError) and make and left:
+                continue
+            raise FileError(f"cannot lock '{folder}': {brief(error)}") from error
+        return lock
+    raise AssertionError
+
+
+def _check_lock(path: Path) -> None:
+    """Refuse a lock that is also something else: a link, or the second name of another file."""
+    try:
+        found = os.lstat(path)
+    except FileNotFoundError:
+        return
+    if not stat.S_ISREG(found.st_mode) or found.st_nlink > 1:
+        raise RunError(
+            f"'{path}' is no lock of a training but a link, or another kind of file; remove it"
+        )

@@ -13,6 +13,7 @@ summary.json    what came out
 
 import contextlib
 import dataclasses
+import fnmatch
 import functools
 import json
 import os
@@ -22,10 +23,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from mjcartpole.errors import CheckpointError, ConfigError, ModelError, RunError
+from mjcartpole.envs.backend import Backend
+from mjcartpole.errors import CheckpointError, ModelError, RunError
 from mjcartpole.files import (
+    brief,
+    is_file,
+    is_folder,
     is_temporary,
-    remove_leftovers,
+    names_in,
+    read_bytes,
+    remove,
     write_whole,
 )
 from mjcartpole.learning.checkpoints import (
@@ -36,10 +43,12 @@ from mjcartpole.learning.checkpoints import (
     load_checkpoint,
 )
 from mjcartpole.learning.config import TrainConfig
+from mjcartpole.learning.episodes import ENDINGS
 from mjcartpole.learning.folders import LOCK, held_folder, locked_folder
 from mjcartpole.learning.policy import Policy
+from mjcartpole.learning.stored import Fields, read_document
 from mjcartpole.learning.training import TrainResult
-from mjcartpole.physics.model import CartPole, load_model, same_model
+from mjcartpole.physics.model import CartPole, load_model, load_named, same_model
 from mjcartpole.versions import version_of
 
 CONFIG, VERSIONS, MODEL = "config.json", "versions.json", "model.xml"
@@ -50,6 +59,32 @@ RESULTS: Final = (EPISODES, POLICY, TIMING, SUMMARY)
 FILES: Final = (*BEGINNING, *RESULTS)
 EVENTS: Final = "events.out.tfevents.*"
 """TensorBoard's (see tensorboard.py)."""
+
+_LARGEST_MODEL: Final = 2**24
+"""Bytes."""
+
+_CONFIG_FIELDS: Final[Fields] = {"preset": str, "video": bool, **TrainConfig.fields()}
+_EVALUATION_FIELDS: Final[Fields] = {
+    "backend": Backend,
+    "seed": int,
+    "episodes": int,
+    "mean": float,
+    "minimum": float,
+    "endings": dict.fromkeys(ENDINGS, int),
+}
+_SUMMARY_FIELDS: Final[Fields] = {
+    "preset": str,
+    "backend": Backend,
+    "model": str,
+    "seed": int,
+    "episodes": int,
+    "interrupted": bool,
+    "steps": int,
+    "mean_return_last_100": float | None,
+    "evaluation?": _EVALUATION_FIELDS,
+    "video?": str,
+}
+"""What `conclude` writes (see studies/conduct.py)."""
 
 PACKAGES: Final = ("mjcartpole", "mujoco", "dm-control", "gymnasium", "numpy", "numba", "imageio")
 
@@ -149,7 +184,6 @@ def begin_run(
     Raises:
         FileError: The folder cannot be written.
     """
-    # The config first: without it a folder holds no run, so that two are never mixed.
     _remove_files(folder)
     write_versions(folder)
     write_whole(folder / MODEL, cartpole.xml)
@@ -194,11 +228,7 @@ def read_summary(folder: Path) -> dict[str, Any]:
     Raises:
         RunError: It is not there or damaged.
     """
-    try:
-        summary: dict[str, Any] = json.loads((folder / SUMMARY).read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise RunError(f"'{folder / SUMMARY}' cannot be read: {error}") from error
-    return summary
+    return read_document(folder / SUMMARY, _SUMMARY_FIELDS, dict, "cannot be read")
 
 
 def finish_run(folder: Path) -> None:
@@ -212,11 +242,10 @@ def remove_run(folder: Path) -> None:
     Raises:
         RunError: A training is at work in it.
     """
-    if not folder.is_dir():
+    if not is_folder(folder, follow=False):
         return
     with locked_folder(folder):
         _remove_files(folder)
-        remove_leftovers(folder)
     with contextlib.suppress(OSError):
         folder.rmdir()  # Only an empty one goes.
 
@@ -229,7 +258,28 @@ def is_complete(folder: Path) -> bool:
 
 def has_events(folder: Path) -> bool:
     """Whether TensorBoard events were written for a run."""
-    return any(folder.glob(EVENTS))
+    return bool(fnmatch.filter(names_in(folder), EVENTS))
+
+
+def check_complete(folder: Path) -> tuple[TrainConfig, dict[str, Any]]:
+    """Read all of a run that is complete, and clear what a kill at its very end has left.
+
+    Returns:
+        Its config and the figures of its evaluation.
+
+    Raises:
+        RunError: It is damaged, or another training is at work in it.
+        ModelError: Its model was damaged.
+    """
+    with locked_folder(folder):
+        config, summary = load_run(folder).config, read_summary(folder)
+        read_model(folder, config)
+    if summary["interrupted"] or "evaluation" not in summary:
+        raise RunError(
+            f"the training of '{folder}' was interrupted and its checkpoint is not there any more; "
+            "start again with --overwrite"
+        )
+    return config, dict(summary["evaluation"])
 
 
 def load_run(folder: str | os.PathLike[str]) -> Run:
@@ -240,14 +290,16 @@ def load_run(folder: str | os.PathLike[str]) -> Run:
         PolicyFileError: Its policy is damaged.
     """
     path = Path(folder)
-    if not path.is_dir():
+    if not is_folder(path):
         raise RunError(f"no run folder or policy file '{path}'; `mjcartpole train` makes a run")
-    missing = [name for name in (CONFIG, MODEL, POLICY) if not (path / name).is_file()]
+    content = content_of(path)
+    missing = [name for name in (CONFIG, MODEL, POLICY) if name not in content]
     if missing:
         hint = f"; go on with `mjcartpole train --resume {path}`" if CONFIG not in missing else ""
         raise RunError(f"'{path}' is no complete run folder: {', '.join(missing)} missing{hint}")
-    policy = Policy.load(path / POLICY)
+    policy = Policy.load(path / POLICY, follow=False)
     preset, _, config = _read_config(path / CONFIG)
+    _read_document(path)
     return Run(path, preset, config, policy)
 
 
@@ -265,12 +317,16 @@ def resumed_folder(path: Path) -> Iterator[Begun]:
         ModelError: The model was damaged.
     """
     folder = run_folder(path)
+    if CONFIG not in content_of(folder):
+        raise RunError(
+            f"'{folder}' holds no training that could be continued; start one with "
+            f"`mjcartpole train --run-dir {folder}`"
+        )
     with locked_folder(folder):
-        remove_leftovers(folder)
         begun = _load_begun(folder, path)
         if begun.checkpoint is not None:
             # The one that was chosen is now the latest, and a damaged one takes no place again.
-            keep_only(folder, path if path.is_file() else folder / LATEST)
+            keep_only(folder, path if path != folder else folder / LATEST)
         yield begun
 
 
@@ -280,22 +336,32 @@ def stored_model(document: str, config: TrainConfig) -> CartPole:
     Raises:
         ModelError: The document was damaged.
     """
-    cartpole = load_model(document, own_timestep=config.own_timestep)
+    # Never by `load_model`, which would take some texts for a model's name or a path.
+    cartpole = load_named(document, "the stored model", own_timestep=config.own_timestep)
     return dataclasses.replace(cartpole, name=config.model)
 
 
-def _load_begun(folder: Path, path: Path) -> Begun:
-    if not (folder / CONFIG).is_file():
-        raise RunError(
-            f"'{folder}' holds no training that could be continued; start one with "
-            f"`mjcartpole train --run-dir {folder}`"
-        )
-    preset, video, config = _read_config(folder / CONFIG)
+def read_model(folder: Path, config: TrainConfig) -> CartPole:
+    """The model that a run folder stores.
+
+    Raises:
+        RunError: It cannot be read.
+        ModelError: It was damaged.
+    """
+    return stored_model(_read_document(folder), config)
+
+
+def _read_document(folder: Path) -> str:
+    content = read_bytes(folder / MODEL, _LARGEST_MODEL, refusal=RunError)
     try:
-        document = (folder / MODEL).read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise RunError(f"'{folder / MODEL}' cannot be read: {error}") from error
-    cartpole = stored_model(document, config)
+        return content.decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise RunError(f"'{folder / MODEL}' cannot be read: {brief(error)}") from error
+
+
+def _load_begun(folder: Path, path: Path) -> Begun:
+    preset, video, config = _read_config(folder / CONFIG)
+    cartpole = read_model(folder, config)
     checkpoint = _checkpoint(folder, path, config, cartpole)
     return Begun(folder, preset, video, config, cartpole, checkpoint)
 
@@ -306,9 +372,9 @@ def run_folder(path: Path) -> Path:
     Raises:
         RunError: There is neither.
     """
-    if path.is_dir():
+    if is_folder(path):
         return path
-    if path.is_file():
+    if is_file(path):
         return path.parent
     raise RunError(f"no run folder or checkpoint '{path}'; `mjcartpole train` makes a run")
 
@@ -322,15 +388,15 @@ def versions() -> dict[str, str]:
 def _checkpoint(
     folder: Path, path: Path, config: TrainConfig, cartpole: CartPole
 ) -> Checkpoint | None:
-    latest, previous = folder / LATEST, folder / PREVIOUS
+    latest, previous, content = folder / LATEST, folder / PREVIOUS, names_in(folder)
     load = functools.partial(
         load_checkpoint, config=config, document=cartpole.xml, poles=cartpole.poles
     )
-    if path.is_file():
+    if path != folder:
         return load(path)
-    if not latest.exists():
+    if LATEST not in content:
         # Nothing was saved yet, or it was killed between two moves (see save_checkpoint).
-        return load(previous) if previous.exists() else None
+        return load(previous) if PREVIOUS in content else None
     try:
         return load(latest)
     except CheckpointError as error:
@@ -353,6 +419,8 @@ def _check_free(folder: Path, overwrite: bool) -> None:
     killed = VERSIONS in content and content <= {MODEL, VERSIONS, LATEST, PREVIOUS}
     if not content or killed:
         return
+    if folders := [name for name in _own(content) if is_folder(folder / name, follow=False)]:
+        raise RunError(f"'{folder / folders[0]}' is a folder where a run has a file; move it away")
     if CONFIG not in content and not content & set(RESULTS):
         raise RunError(f"'{folder}' holds other files and is no run; choose another --run-dir")
     if not overwrite:
@@ -365,31 +433,33 @@ def _check_free(folder: Path, overwrite: bool) -> None:
 
 def content_of(folder: Path) -> set[str]:
     """Names of what lies in a folder, without what a killed training may have left behind."""
-    if not folder.is_dir():
-        return set()
-    return {path.name for path in folder.iterdir() if not is_temporary(path.name)} - {LOCK}
+    return {name for name in names_in(folder) if not is_temporary(name)} - {LOCK}
 
 
 def _remove(folder: Path, names: Iterable[str]) -> None:
     for name in names:
-        (folder / name).unlink(missing_ok=True)
+        remove(folder / name)
+
+
+def _own(content: set[str]) -> list[str]:
+    """Names of a run's files, those of `content` among them, in the order of their removal."""
+    # The config first: without it a folder holds no run, so that two are never mixed.
+    events = fnmatch.filter(content, EVENTS)
+    return [CONFIG, MODEL, *events, *RESULTS, LATEST, PREVIOUS, VERSIONS]
 
 
 def _remove_files(folder: Path) -> None:
-    """Remove all files of a run, the config first."""
-    events = (path.name for path in folder.glob(EVENTS))
-    _remove(folder, (CONFIG, MODEL, *events, *RESULTS, LATEST, PREVIOUS, VERSIONS))
+    _remove(folder, _own(names_in(folder)))
 
 
 def _read_config(path: Path) -> tuple[str, bool, TrainConfig]:
     """Preset, whether there is a video, and config."""
-    try:
-        values: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-        preset, video = str(values.pop("preset")), bool(values.pop("video", False))
-        lists = {key: tuple(value) for key, value in values.items() if isinstance(value, list)}
-        return preset, video, TrainConfig(**{**values, **lists})
-    except (OSError, ValueError, TypeError, KeyError, AttributeError, ConfigError) as error:
-        raise RunError(f"'{path}' is not the config of a run, or is damaged: {error}") from error
+
+    def made(values: dict[str, Any]) -> tuple[str, bool, TrainConfig]:
+        return values.pop("preset"), values.pop("video"), TrainConfig(**values)
+
+    otherwise = "is not the config of a run, or is damaged"
+    return read_document(path, _CONFIG_FIELDS, made, otherwise)
 
 
 def _json(values: dict[str, Any]) -> str:

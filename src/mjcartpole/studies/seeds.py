@@ -5,6 +5,7 @@ import contextlib
 import dataclasses
 import multiprocessing
 import os
+import reprlib
 import signal
 import threading
 from collections.abc import Callable, Iterator, Sequence
@@ -131,7 +132,7 @@ class Crew:
         Raises:
             ConfigError: The seeds or workers make no sense.
         """
-        self.seeds = _check_seeds(config, seeds)
+        self.seeds = check_seeds(config, seeds)
         self.workers = min(_check_workers(workers), len(self.seeds))
         self._config = config
         on_mujoco = config.backend == "mujoco"
@@ -141,7 +142,7 @@ class Crew:
                 config=dataclasses.replace(config, seed=seed),
                 engine=self._engine,
                 document=cartpole.xml if on_mujoco else None,
-                folder=None if folder is None else folder / f"seed-{seed}",
+                folder=None if folder is None else seed_folder(folder, seed),
                 preset=preset,
                 every=every,
                 events=events,
@@ -271,8 +272,11 @@ def _train_on_disk(
     job: _Job, folder: Path, cartpole: CartPole, stop: Callable[[], bool]
 ) -> SeedResult:
     seed = job.config.seed
+    check_no_link(folder)
     if runs.is_complete(folder):
-        return SeedResult(seed, runs.read_summary(folder).get("evaluation"))
+        config, figures = runs.check_complete(folder)
+        _check_same(job, folder, config)
+        return SeedResult(seed, figures)
     training = Training(job.config, engine=job.engine, cartpole=cartpole)
     session = Session(folder, training, cartpole, every=job.every)
     with _begun(job, folder, cartpole) as checkpoint:
@@ -291,10 +295,9 @@ def _train_on_disk(
 @contextlib.contextmanager
 def _begun(job: _Job, folder: Path, cartpole: CartPole) -> Iterator[Checkpoint | None]:
     """Hold a seed's folder; yields where to go on."""
-    if (folder / runs.CONFIG).is_file():
+    if runs.CONFIG in runs.content_of(folder):
         with runs.resumed_folder(folder) as begun:
-            if begun.config != job.config:
-                raise RunError(f"'{folder}' holds a run with another config")
+            _check_same(job, folder, begun.config)
             yield begun.checkpoint
     else:
         with runs.claimed_folder(folder):
@@ -302,13 +305,46 @@ def _begun(job: _Job, folder: Path, cartpole: CartPole) -> Iterator[Checkpoint |
             yield None
 
 
-def _check_seeds(config: TrainConfig, seeds: int | Sequence[int]) -> tuple[int, ...]:
+def _check_same(job: _Job, folder: Path, config: TrainConfig) -> None:
+    if config != job.config:
+        raise RunError(f"'{folder}' holds a run with another config")
+
+
+def seed_folder(folder: Path, seed: int) -> Path:
+    """Where one seed's run lies in the folder of many."""
+    return folder / f"seed-{seed}"
+
+
+def check_no_link(folder: Path) -> None:
+    """Refuse a run inside a folder of many seeds that in truth lies elsewhere.
+
+    Raises:
+        RunError: See above.
+    """
+    if folder.is_symlink():
+        raise RunError(
+            f"'{folder}' is a link: what it leads to is no part of these runs; remove it, or put "
+            "the run itself in its place"
+        )
+
+
+def check_seeds(config: TrainConfig, seeds: int | Sequence[int]) -> tuple[int, ...]:
+    """The seeds that are meant; a number stands for that many from the config's own on.
+
+    Raises:
+        ConfigError: They are too many, none, the same twice, or no seeds.
+    """
     if isinstance(seeds, int):
         if not 1 <= seeds <= MAX_SEEDS:
             raise ConfigError(f"seeds must be a number from 1 to {MAX_SEEDS:,}, not {seeds}")
-        return tuple(range(config.seed, config.seed + seeds))
-    if not seeds or len(set(seeds)) != len(seeds):
-        raise ConfigError(f"seeds must be different numbers, at least one, not {list(seeds)}")
+        seeds = range(config.seed, config.seed + seeds)
+    if not 1 <= len(seeds) <= MAX_SEEDS or len(set(seeds)) != len(seeds):
+        raise ConfigError(
+            f"seeds must be different numbers, at least one and at most {MAX_SEEDS:,}, "
+            f"not {reprlib.repr(list(seeds))}"
+        )
+    for seed in (min(seeds), max(seeds)):
+        _ = dataclasses.replace(config, seed=seed)
     return tuple(seeds)
 
 
