@@ -7,7 +7,7 @@ import json
 import pytest
 
 from mjcartpole.errors import CheckpointError, FileError, ModelError, PolicyFileError, RunError
-from mjcartpole.learning import folders, runs
+from mjcartpole.learning import documents, folders, runs
 from mjcartpole.learning.checkpoints import LATEST, PREVIOUS
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.session import Session
@@ -110,7 +110,7 @@ def test_free_folders_are_counted(tmp_path):
     assert folders.free_folder(tmp_path, "a").name == "a-3"
 
 
-@pytest.mark.parametrize("name", [runs.CONFIG, runs.MODEL, runs.POLICY])
+@pytest.mark.parametrize("name", [documents.CONFIG, runs.MODEL, runs.POLICY])
 def test_a_missing_file_is_named(run, name):
     (run / name).unlink()
     with pytest.raises(RunError, match=f"{name} missing"):
@@ -127,7 +127,7 @@ def test_a_folder_that_is_not_there(tmp_path):
     ["", "{", "[]", "{}", '{"preset": "tuned", "bins": 3}', '{"preset": "x", "unknown": 1}'],
 )
 def test_a_damaged_config_is_refused(run, text):
-    (run / runs.CONFIG).write_text(text)
+    (run / documents.CONFIG).write_text(text)
     with pytest.raises(RunError, match="not the config of a run, or is damaged"):
         runs.load_run(run)
 
@@ -239,7 +239,7 @@ def test_a_run_is_complete_when_its_checkpoints_are_gone(begun, result):
     runs.finish_run(begun)
     assert runs.is_complete(begun)
     assert sorted(path.name for path in begun.iterdir()) == sorted(runs.FILES)
-    assert runs.read_summary(begun) == SUMMARY
+    assert documents.read_summary(begun) == SUMMARY
     assert runs.check_complete(begun) == (result.config, SUMMARY["evaluation"])
     assert runs.load_run(begun).preset == "article"
 
@@ -251,11 +251,11 @@ def test_a_run_without_results_says_how_to_go_on(begun):
 
 @pytest.mark.parametrize("text", ["", "{", None])
 def test_a_summary_that_cannot_be_read(run, text):
-    (run / runs.SUMMARY).unlink()
+    (run / documents.SUMMARY).unlink()
     if text is not None:
-        (run / runs.SUMMARY).write_text(text)
+        (run / documents.SUMMARY).write_text(text)
     with pytest.raises(RunError, match=r"summary\.json' cannot be read"):
-        runs.read_summary(run)
+        documents.read_summary(run)
 
 
 def test_beginning_again_mixes_nothing_with_the_older_run(begun, result):

@@ -5,7 +5,7 @@ import json
 import pytest
 
 from mjcartpole.errors import FileError, RunError
-from mjcartpole.learning import folders, runs
+from mjcartpole.learning import documents, folders, runs
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.physics.model import load_model, same_model
 from mjcartpole.studies import seed_runs
@@ -43,7 +43,7 @@ def test_what_many_seeds_leave(tmp_path):
         assert runs.is_complete(folder)
         run = runs.load_run(folder)
         assert (run.config, run.preset) == (found.result.config, "article")
-        assert runs.read_summary(folder)["evaluation"] == found.evaluation
+        assert documents.read_summary(folder)["evaluation"] == found.evaluation
 
 
 def test_what_was_begun_comes_back(tmp_path):

@@ -12,6 +12,7 @@ disk that is full, leaves the ones before.
 """
 
 import dataclasses
+import functools
 import hashlib
 import io
 import json
@@ -26,7 +27,7 @@ import numpy as np
 import numpy.typing as npt
 
 from mjcartpole.errors import CheckpointError
-from mjcartpole.files import brief, opened, replacing, sync
+from mjcartpole.files import brief, names_in, opened, replacing, sync
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.episodes import ENDINGS, Columns
 from mjcartpole.learning.stored import Fields, checked, parse
@@ -143,6 +144,46 @@ def load_checkpoint(
         except _NOT_UNDERSTOOD as error:
             reason = brief(error) or type(error).__name__
             raise CheckpointError(f"'{path}' cannot be understood: {reason}") from error
+
+
+def choose_checkpoint(
+    folder: Path, path: Path, config: TrainConfig, document: str, *, poles: int
+) -> Checkpoint | None:
+    """Where a training goes on: at its latest checkpoint, or the one that was asked for.
+
+    Args:
+        folder: The run folder.
+        path: The same, or a checkpoint in it.
+        config: See `load_checkpoint`, here and below.
+        document: The model.
+        poles: How many that has.
+
+    Returns:
+        None where there is none.
+
+    Raises:
+        CheckpointError: It is damaged; the message offers the previous one, if that is good.
+    """
+    latest, previous, content = folder / LATEST, folder / PREVIOUS, names_in(folder)
+    load = functools.partial(load_checkpoint, config=config, document=document, poles=poles)
+    if path != folder:
+        return load(path)
+    if LATEST not in content:
+        # Nothing was saved yet, or it was killed between two moves (see save_checkpoint).
+        return load(previous) if PREVIOUS in content else None
+    try:
+        return load(latest)
+    except CheckpointError as error:
+        try:
+            older = load(previous)
+        except CheckpointError:
+            hint = "there is no good one before it; start again with --overwrite"
+        else:
+            hint = (
+                f"the one before it, after {older.episodes:,} episodes, is good: "
+                f"mjcartpole train --resume {previous}"
+            )
+        raise CheckpointError(f"{error}; {hint}") from error
 
 
 def keep_only(folder: Path, path: Path) -> None:

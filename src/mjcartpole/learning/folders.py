@@ -10,12 +10,9 @@ from typing import Final
 import filelock
 
 from mjcartpole.errors import FileError, RunError
-from mjcartpole.files import brief, make_folder, remove_leftovers
+from mjcartpole.files import brief, is_folder, remove_leftovers
 
 LOCK: Final = ".lock"
-
-_TRIES: Final = 100
-"""How often a folder may vanish before it is locked."""
 
 
 def free_folder(parent: Path, name: str) -> Path:
@@ -67,26 +64,25 @@ def locked_folder(folder: Path, *, make: bool = False) -> Iterator[None]:
         lock.release()
 
 
-def _acquired(folder: Path, make: bool) -> filelock.BaseFileLock:
+def _acquired(folder: Path, make: bool, tries: int = 100) -> filelock.BaseFileLock:
     lock = filelock.FileLock(folder / LOCK)
-    for left in reversed(range(_TRIES)):
+    try:
         if make:
-            make_folder(folder)
-        try:
-            _check_lock(folder / LOCK)
-            lock.acquire(timeout=0)
-        except filelock.Timeout:
-            raise RunError(
-                f"run folder '{folder}' is in use by another training; wait for its end, or choose "
-                "another --run-dir"
-            ) from None
-        except OSError as error:
-            # Another training may have ended right now, and its empty folder with it.
-            if isinstance(error, FileNotFoundError) and make and left:
-                continue
-            raise FileError(f"cannot lock '{folder}': {brief(error)}") from error
-        return lock
-    raise AssertionError
+            folder.mkdir(parents=True, exist_ok=True)
+        _check_lock(folder / LOCK)
+        lock.acquire(timeout=0)
+    except filelock.Timeout:
+        raise RunError(
+            f"run folder '{folder}' is in use by another training; wait for its end, or choose "
+            "another --run-dir"
+        ) from None
+    except OSError as error:
+        # Another training may have ended right now, and its empty folder with it.
+        if make and tries and isinstance(error, FileNotFoundError | FileExistsError):
+            return _acquired(folder, make, tries - 1)
+        task = "lock" if is_folder(folder) else "make the folder"
+        raise FileError(f"cannot {task} '{folder}': {brief(error)}") from error
+    return lock
 
 
 def _check_lock(path: Path) -> None:

@@ -19,7 +19,7 @@ from mjcartpole.errors import ConfigError, PolicyFileError
 from mjcartpole.files import brief, read_bytes, write_whole
 from mjcartpole.learning.discretizer import Discretizer
 from mjcartpole.learning.stored import checked, parse
-from mjcartpole.task import N_ACTIONS, in_words
+from mjcartpole.task import N_ACTIONS, in_words, state_names
 
 FORMAT = "mjcartpole-policy"
 VERSION = 1
@@ -87,10 +87,12 @@ class Policy:
         Raises:
             ConfigError: See above.
         """
-        if self.poles != poles:
+        n = len(self.discretizer.bins)
+        if n != len(state_names(poles)):
+            whole = n % 2 == 0 and self.poles > 0
+            what = in_words(self.poles) if whole else f"observations of {n} values"
             raise ConfigError(
-                f"the policy is for {in_words(self.poles)}, and {where} has {in_words(poles)}; "
-                "train one there"
+                f"the policy is for {what}, and {where} has {in_words(poles)}; train one there"
             )
 
     def save(self, path: str | os.PathLike[str]) -> None:

@@ -14,7 +14,6 @@ summary.json    what came out
 import contextlib
 import dataclasses
 import fnmatch
-import functools
 import json
 import os
 import platform
@@ -23,8 +22,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from mjcartpole.envs.backend import Backend
-from mjcartpole.errors import CheckpointError, ModelError, RunError
+from mjcartpole.errors import ModelError, RunError
 from mjcartpole.files import (
     brief,
     is_file,
@@ -39,20 +37,24 @@ from mjcartpole.learning.checkpoints import (
     LATEST,
     PREVIOUS,
     Checkpoint,
+    choose_checkpoint,
     keep_only,
-    load_checkpoint,
 )
 from mjcartpole.learning.config import TrainConfig
-from mjcartpole.learning.episodes import ENDINGS
+from mjcartpole.learning.documents import (
+    CONFIG,
+    SUMMARY,
+    read_config,
+    read_figures,
+)
 from mjcartpole.learning.folders import LOCK, held_folder, locked_folder
 from mjcartpole.learning.policy import Policy
-from mjcartpole.learning.stored import Fields, read_document
 from mjcartpole.learning.training import TrainResult
 from mjcartpole.physics.model import CartPole, load_model, load_named, same_model
 from mjcartpole.versions import version_of
 
-CONFIG, VERSIONS, MODEL = "config.json", "versions.json", "model.xml"
-EPISODES, POLICY, SUMMARY, TIMING = "episodes.csv", "policy.json", "summary.json", "timing.json"
+VERSIONS, MODEL = "versions.json", "model.xml"
+EPISODES, POLICY, TIMING = "episodes.csv", "policy.json", "timing.json"
 BEGINNING: Final = (VERSIONS, MODEL, CONFIG)
 """In the order of writing: what a kill leaves of them is known by the versions."""
 RESULTS: Final = (EPISODES, POLICY, TIMING, SUMMARY)
@@ -62,29 +64,6 @@ EVENTS: Final = "events.out.tfevents.*"
 
 _LARGEST_MODEL: Final = 2**24
 """Bytes."""
-
-_CONFIG_FIELDS: Final[Fields] = {"preset": str, "video": bool, **TrainConfig.fields()}
-_EVALUATION_FIELDS: Final[Fields] = {
-    "backend": Backend,
-    "seed": int,
-    "episodes": int,
-    "mean": float,
-    "minimum": float,
-    "endings": dict.fromkeys(ENDINGS, int),
-}
-_SUMMARY_FIELDS: Final[Fields] = {
-    "preset": str,
-    "backend": Backend,
-    "model": str,
-    "seed": int,
-    "episodes": int,
-    "interrupted": bool,
-    "steps": int,
-    "mean_return_last_100": float | None,
-    "evaluation?": _EVALUATION_FIELDS,
-    "video?": str,
-}
-"""What `conclude` writes (see studies/conduct.py)."""
 
 PACKAGES: Final = ("mjcartpole", "mujoco", "dm-control", "gymnasium", "numpy", "numba", "imageio")
 
@@ -222,15 +201,6 @@ def write_summary(folder: Path, summary: dict[str, Any]) -> None:
     write_whole(folder / SUMMARY, _json(summary))
 
 
-def read_summary(folder: Path) -> dict[str, Any]:
-    """A run's summary.
-
-    Raises:
-        RunError: It is not there or damaged.
-    """
-    return read_document(folder / SUMMARY, _SUMMARY_FIELDS, dict, "cannot be read")
-
-
 def finish_run(folder: Path) -> None:
     """Drop the checkpoints of a run that is complete."""
     _remove(folder, (PREVIOUS, LATEST))
@@ -272,14 +242,9 @@ def check_complete(folder: Path) -> tuple[TrainConfig, dict[str, Any]]:
         ModelError: Its model was damaged.
     """
     with locked_folder(folder):
-        config, summary = load_run(folder).config, read_summary(folder)
+        config = load_run(folder).config
         read_model(folder, config)
-    if summary["interrupted"] or "evaluation" not in summary:
-        raise RunError(
-            f"the training of '{folder}' was interrupted and its checkpoint is not there any more; "
-            "start again with --overwrite"
-        )
-    return config, dict(summary["evaluation"])
+        return config, read_figures(folder, config)
 
 
 def load_run(folder: str | os.PathLike[str]) -> Run:
@@ -298,7 +263,7 @@ def load_run(folder: str | os.PathLike[str]) -> Run:
         hint = f"; go on with `mjcartpole train --resume {path}`" if CONFIG not in missing else ""
         raise RunError(f"'{path}' is no complete run folder: {', '.join(missing)} missing{hint}")
     policy = Policy.load(path / POLICY, follow=False)
-    preset, _, config = _read_config(path / CONFIG)
+    preset, _, config = read_config(path)
     _read_document(path)
     return Run(path, preset, config, policy)
 
@@ -317,11 +282,13 @@ def resumed_folder(path: Path) -> Iterator[Begun]:
         ModelError: The model was damaged.
     """
     folder = run_folder(path)
-    if CONFIG not in content_of(folder):
+    content = content_of(folder)
+    if CONFIG not in content:
         raise RunError(
             f"'{folder}' holds no training that could be continued; start one with "
             f"`mjcartpole train --run-dir {folder}`"
         )
+    _check_files(folder, content)
     with locked_folder(folder):
         begun = _load_begun(folder, path)
         if begun.checkpoint is not None:
@@ -360,9 +327,9 @@ def _read_document(folder: Path) -> str:
 
 
 def _load_begun(folder: Path, path: Path) -> Begun:
-    preset, video, config = _read_config(folder / CONFIG)
+    preset, video, config = read_config(folder)
     cartpole = read_model(folder, config)
-    checkpoint = _checkpoint(folder, path, config, cartpole)
+    checkpoint = choose_checkpoint(folder, path, config, cartpole.xml, poles=cartpole.poles)
     return Begun(folder, preset, video, config, cartpole, checkpoint)
 
 
@@ -385,33 +352,6 @@ def versions() -> dict[str, str]:
     return found | {package: version_of(package) or "not installed" for package in PACKAGES}
 
 
-def _checkpoint(
-    folder: Path, path: Path, config: TrainConfig, cartpole: CartPole
-) -> Checkpoint | None:
-    latest, previous, content = folder / LATEST, folder / PREVIOUS, names_in(folder)
-    load = functools.partial(
-        load_checkpoint, config=config, document=cartpole.xml, poles=cartpole.poles
-    )
-    if path != folder:
-        return load(path)
-    if LATEST not in content:
-        # Nothing was saved yet, or it was killed between two moves (see save_checkpoint).
-        return load(previous) if PREVIOUS in content else None
-    try:
-        return load(latest)
-    except CheckpointError as error:
-        try:
-            older = load(previous)
-        except CheckpointError:
-            hint = "there is no good one before it; start again with --overwrite"
-        else:
-            hint = (
-                f"the one before it, after {older.episodes:,} episodes, is good: "
-                f"mjcartpole train --resume {previous}"
-            )
-        raise CheckpointError(f"{error}; {hint}") from error
-
-
 def _check_free(folder: Path, overwrite: bool) -> None:
     content = content_of(folder)
     # A training that was killed in its first moment leaves no config: nothing is lost with it.
@@ -419,8 +359,7 @@ def _check_free(folder: Path, overwrite: bool) -> None:
     killed = VERSIONS in content and content <= {MODEL, VERSIONS, LATEST, PREVIOUS}
     if not content or killed:
         return
-    if folders := [name for name in _own(content) if is_folder(folder / name, follow=False)]:
-        raise RunError(f"'{folder / folders[0]}' is a folder where a run has a file; move it away")
+    _check_files(folder, content)
     if CONFIG not in content and not content & set(RESULTS):
         raise RunError(f"'{folder}' holds other files and is no run; choose another --run-dir")
     if not overwrite:
@@ -429,6 +368,13 @@ def _check_free(folder: Path, overwrite: bool) -> None:
             f"run folder '{folder}' exists; choose another --run-dir{unfinished}, or replace it "
             "with --overwrite"
         )
+
+
+def _check_files(folder: Path, content: set[str]) -> None:
+    """Refuse folders where a run has files, before any work is lost to them."""
+    for name in _own(content):
+        if is_folder(folder / name, follow=False):
+            raise RunError(f"'{folder / name}' is a folder where a run has a file; move it away")
 
 
 def content_of(folder: Path) -> set[str]:
@@ -450,16 +396,6 @@ def _own(content: set[str]) -> list[str]:
 
 def _remove_files(folder: Path) -> None:
     _remove(folder, _own(names_in(folder)))
-
-
-def _read_config(path: Path) -> tuple[str, bool, TrainConfig]:
-    """Preset, whether there is a video, and config."""
-
-    def made(values: dict[str, Any]) -> tuple[str, bool, TrainConfig]:
-        return values.pop("preset"), values.pop("video"), TrainConfig(**values)
-
-    otherwise = "is not the config of a run, or is damaged"
-    return read_document(path, _CONFIG_FIELDS, made, otherwise)
 
 
 def _json(values: dict[str, Any]) -> str:

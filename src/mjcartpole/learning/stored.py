@@ -17,6 +17,9 @@ MOST_BYTES: Final = 2**23
 MOST_VALUES: Final = 2**22
 """The largest policy has three quarters of them."""
 
+MOST_CHARACTERS: Final = 4096
+"""Of a text: as many as a path may have."""
+
 MOST_DIGITS: Final = 39
 """Of a whole number: the state of a random generator has 128 bits."""
 
@@ -100,7 +103,10 @@ def _fits(value: object, kind: Kind) -> bool:
         return type(value) is list and all(_fits(each, inner[0]) for each in value)
     if origin in {Union, UnionType}:
         return any(_fits(value, each) for each in inner)
-    return type(value) is kind or (kind is float and type(value) is int)
+    if kind is str and type(value) is str and len(value) <= MOST_CHARACTERS:
+        # Names of files may hold bytes that are no text; a line break is another matter.
+        return value.encode("utf-8", "ignore").decode("utf-8").isprintable()
+    return kind is not str and type(value) in ((float, int) if kind is float else (kind,))
 
 
 def _whole(digits: str) -> int:

@@ -19,6 +19,7 @@ from mjcartpole.errors import ConfigError, MjCartPoleError, RunError
 from mjcartpole.learning import runs
 from mjcartpole.learning.checkpoints import Checkpoint
 from mjcartpole.learning.config import TrainConfig
+from mjcartpole.learning.documents import CONFIG
 from mjcartpole.learning.engine import Engine, choose_engine
 from mjcartpole.learning.session import CHECKPOINT_EVERY, Session
 from mjcartpole.learning.training import Training, TrainResult
@@ -295,12 +296,13 @@ def _train_on_disk(
 @contextlib.contextmanager
 def _begun(job: _Job, folder: Path, cartpole: CartPole) -> Iterator[Checkpoint | None]:
     """Hold a seed's folder; yields where to go on."""
-    if runs.CONFIG in runs.content_of(folder):
+    if CONFIG in runs.content_of(folder):
         with runs.resumed_folder(folder) as begun:
             _check_same(job, folder, begun.config)
             yield begun.checkpoint
     else:
-        with runs.claimed_folder(folder):
+        # What else lies there is the rest of a run whose removal was cut short.
+        with runs.claimed_folder(folder, overwrite=True):
             runs.begin_run(folder, job.config, cartpole, preset=job.preset)
             yield None
 
