@@ -23,7 +23,7 @@ from mjcartpole.learning import runs, tensorboard
 from mjcartpole.learning.checkpoints import LATEST
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.engine import Engine
-from mjcartpole.learning.folders import free_folder
+from mjcartpole.learning.folders import SEEDS, free_folder
 from mjcartpole.learning.session import CHECKPOINT_EVERY, Session, check_interval
 from mjcartpole.learning.training import Training, TrainResult
 from mjcartpole.physics.model import CartPole
@@ -111,7 +111,7 @@ def run_resume(path: Path, how: How) -> int:
     """
     silence_mujoco()
     _check(how)
-    if seed_runs.SEEDS in runs.content_of(path):
+    if SEEDS in runs.content_of(path):
         return _resume_seeds(path, how)
     if how.workers is not None:
         raise ConfigError("--workers is for several --seeds")

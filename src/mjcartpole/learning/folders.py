@@ -10,9 +10,11 @@ from typing import Final
 import filelock
 
 from mjcartpole.errors import FileError, RunError
-from mjcartpole.files import brief, is_folder, remove_leftovers
+from mjcartpole.files import brief, is_folder, names_in, remove_leftovers
 
 LOCK: Final = ".lock"
+SEEDS: Final = "seeds.json"
+"""Lies in a folder of many runs (see studies/seed_runs.py)."""
 
 
 def free_folder(parent: Path, name: str) -> Path:
@@ -69,6 +71,7 @@ def _acquired(folder: Path, make: bool, tries: int = 100) -> filelock.BaseFileLo
     try:
         if make:
             folder.mkdir(parents=True, exist_ok=True)
+        check_here(folder)
         _check_lock(folder / LOCK)
         lock.acquire(timeout=0)
     except filelock.Timeout:
@@ -83,6 +86,19 @@ def _acquired(folder: Path, make: bool, tries: int = 100) -> filelock.BaseFileLo
         task = "lock" if is_folder(folder) else "make the folder"
         raise FileError(f"cannot {task} '{folder}': {brief(error)}") from error
     return lock
+
+
+def check_here(folder: Path) -> None:
+    """Refuse a run inside a folder of many that in truth lies elsewhere.
+
+    Raises:
+        RunError: See above.
+    """
+    if folder.is_symlink() and SEEDS in names_in(folder.parent):
+        raise RunError(
+            f"'{folder}' is a link: what it leads to is no part of these runs; remove it, or put "
+            "the run itself in its place"
+        )
 
 
 def _check_lock(path: Path) -> None:

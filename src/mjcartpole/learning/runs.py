@@ -39,14 +39,9 @@ from mjcartpole.learning.checkpoints import (
     Checkpoint,
     choose_checkpoint,
     keep_only,
-)
+)  # fmt: skip
 from mjcartpole.learning.config import TrainConfig
-from mjcartpole.learning.documents import (
-    CONFIG,
-    SUMMARY,
-    read_config,
-    read_figures,
-)
+from mjcartpole.learning.documents import CONFIG, SUMMARY, read_config, read_figures
 from mjcartpole.learning.folders import LOCK, held_folder, locked_folder
 from mjcartpole.learning.policy import Policy
 from mjcartpole.learning.training import TrainResult

@@ -20,12 +20,12 @@ from mjcartpole.errors import RunError
 from mjcartpole.files import remove, write_whole
 from mjcartpole.learning import runs
 from mjcartpole.learning.config import TrainConfig
-from mjcartpole.learning.folders import held_folder, locked_folder
+from mjcartpole.learning.folders import SEEDS, check_here, held_folder, locked_folder
 from mjcartpole.learning.stored import Fields, read_document
 from mjcartpole.physics.model import CartPole
-from mjcartpole.studies.seeds import ManyResult, check_no_link, check_seeds, seed_folder
+from mjcartpole.studies.seeds import ManyResult, check_seeds, seed_folder
 
-SEEDS, TABLE, AGGREGATE = "seeds.json", "seeds.csv", "aggregate.json"
+TABLE, AGGREGATE = "seeds.csv", "aggregate.json"
 FILES: Final = (SEEDS, TABLE, AGGREGATE, runs.MODEL, runs.VERSIONS)
 """In the order of removal: without the seeds a folder holds nothing, and the versions say whose."""
 
@@ -137,7 +137,7 @@ def _clear(folder: Path) -> None:
     if SEEDS in runs.content_of(folder):
         before = [seed_folder(folder, seed) for seed in _read_seeds(folder)[2]]
         for each in before:
-            check_no_link(each)
+            check_here(each)
         for each in before:
             runs.remove_run(each)
     for name in FILES:

@@ -273,7 +273,6 @@ def _train_on_disk(
     job: _Job, folder: Path, cartpole: CartPole, stop: Callable[[], bool]
 ) -> SeedResult:
     seed = job.config.seed
-    check_no_link(folder)
     if runs.is_complete(folder):
         config, figures = runs.check_complete(folder)
         _check_same(job, folder, config)
@@ -315,19 +314,6 @@ def _check_same(job: _Job, folder: Path, config: TrainConfig) -> None:
 def seed_folder(folder: Path, seed: int) -> Path:
     """Where one seed's run lies in the folder of many."""
     return folder / f"seed-{seed}"
-
-
-def check_no_link(folder: Path) -> None:
-    """Refuse a run inside a folder of many seeds that in truth lies elsewhere.
-
-    Raises:
-        RunError: See above.
-    """
-    if folder.is_symlink():
-        raise RunError(
-            f"'{folder}' is a link: what it leads to is no part of these runs; remove it, or put "
-            "the run itself in its place"
-        )
 
 
 def check_seeds(config: TrainConfig, seeds: int | Sequence[int]) -> tuple[int, ...]:
