@@ -51,6 +51,9 @@ def main(argv: Sequence[str] | None = None) -> NoReturn:
     except KeyboardInterrupt as interrupt:
         print(f"mjcartpole: {str(interrupt) or 'interrupted'}", file=sys.stderr)
         code = getattr(interrupt, "exit_code", INTERRUPTED)
+    except MemoryError:
+        print("mjcartpole: error: this takes more memory than there is", file=sys.stderr)
+        code = 2
     except BrokenPipeError:
         # The reader of stdout has gone (`mjcartpole … | head`): nothing is left to say.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -180,7 +180,7 @@ def check_writable(folder: Path) -> None:
     Raises:
         FileError: See above.
     """
-    _make_temporary(folder / "probe").unlink()
+    _make_temporary(folder / "probe").unlink(missing_ok=True)
 
 
 def remove_leftovers(folder: Path) -> None:
@@ -197,7 +197,7 @@ def is_temporary(name: str) -> bool:
 
 def _make_temporary(target: Path) -> Path:
     make_folder(target.parent)
-    if target.is_dir():
+    if is_folder(target):
         raise FileError(f"cannot write '{target}': it is a folder; give the path of a file")
     temporary = target.with_name(f".{target.stem}-{secrets.token_hex(4)}{target.suffix}")
     try:

@@ -299,3 +299,40 @@ def test_files_of_somebody_else_are_never_taken(names, overwrite, tmp_path):
     with pytest.raises(RunError, match="holds other files"):
         claim(tmp_path, overwrite=overwrite)
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(names)
+
+
+@pytest.mark.parametrize("document", ["cartpole", "long", "elsewhere.xml", "/etc/passwd", ""])
+def test_a_stored_model_is_never_taken_for_a_name_or_a_path(document, begun, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "elsewhere.xml").write_text("a secret")
+    (begun / runs.MODEL).write_text(document)
+    with pytest.raises(ModelError, match="the stored model is not a valid MJCF") as refused:
+        resumed(begun)
+    assert "secret" not in str(refused.value)
+
+
+def test_a_complete_run_is_read_before_it_is_said_to_be_so(run, result):
+    assert runs.check_complete(run) == (result.config, SUMMARY["evaluation"])
+    summary = run / documents.SUMMARY
+    for change, why in (
+        ({"interrupted": True}, "not over"),
+        ({"seed": 4}, "seed of another training"),
+        ({"evaluation": {}}, "is missing"),
+    ):
+        summary.write_text(json.dumps({**SUMMARY, **change}))
+        with pytest.raises(RunError, match=why):
+            runs.check_complete(run)
+    summary.write_text(json.dumps(SUMMARY))
+    (run / documents.CONFIG).write_text("{}")
+    with pytest.raises(RunError, match="is not the config of a run"):
+        runs.check_complete(run)
+
+
+def test_a_folder_in_the_place_of_a_file_is_told_before_anything_is_lost(begun):
+    (begun / runs.POLICY).mkdir()
+    before = sorted(begun.iterdir())
+    with pytest.raises(RunError, match="is a folder where a run has a file"):
+        resumed(begun)
+    with pytest.raises(RunError, match="is a folder where a run has a file"):
+        claim(begun, overwrite=True)
+    assert sorted(begun.iterdir()) == before
