@@ -1,9 +1,11 @@
 """Run folders that somebody else made, or broke: one line each, and nothing beside them changes."""
 
+import io
 import json
 import os
 import random
 import shutil
+import sys
 import time
 
 import pytest
@@ -38,9 +40,30 @@ def interrupted(folder, config):
 
 def call(arguments, capsys):
     """Run a command; returns exit code and stderr."""
+    if arguments[0] == "render":
+        return call_forked(arguments)
     with pytest.raises(SystemExit) as stop:
         cli.main([str(argument) for argument in arguments])
     return stop.value.code, capsys.readouterr().err
+
+
+def call_forked(arguments):
+    """The same in a process of its own: one that has used OpenGL cannot be forked any more."""
+    if not (child := os.fork()):
+        code = 99
+        try:
+            with open("told", "w") as told:
+                os.dup2(told.fileno(), 1)
+                os.dup2(told.fileno(), 2)
+                sys.stdout, sys.stderr = io.StringIO(), told
+                cli.main(arguments)
+        except SystemExit as stop:
+            code = stop.code
+        finally:
+            os._exit(code)
+    code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+    with open("told") as told:
+        return code, told.read()
 
 
 @pytest.fixture(scope="module")
@@ -199,9 +222,9 @@ def damage_bytes(path, rng):
 @pytest.mark.parametrize("seed", [0, *(pytest.param(n, marks=pytest.mark.slow) for n in range(9))])
 @pytest.mark.parametrize("damage", [damage_value, damage_bytes])
 def test_damaged_values_and_bytes_are_one_line(damage, seed, place, capsys):
-    rng = random.Random(seed)
+    rng = random.Random(f"{damage.__name__}{seed}")
     for kind in ("one", "gym", "many", "cut", "manycut"):
-        for _ in range(3 if seed == 0 else 10):
+        for _ in range(2 if seed == 0 else 10):
             run, mine = place(kind)
             json_only = damage is damage_value
             files = sorted(run.rglob("*.json" if json_only else "*.*"))
