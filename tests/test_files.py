@@ -8,13 +8,14 @@ import time
 
 import pytest
 
-from mjcartpole.errors import FileError
+from mjcartpole.errors import FileError, RunError
 from mjcartpole.files import (
     check_free,
     check_writable,
     free_path,
     is_temporary,
     make_folder,
+    read_bytes,
     remove_leftovers,
     replacing,
     write_whole,
@@ -149,3 +150,34 @@ def test_only_what_is_there_is_refused(tmp_path):
     for path in (tmp_path / "empty", tmp_path / "empty" / "file"):
         with pytest.raises(FileError, match="--overwrite"):
             check_free([tmp_path / "nothing", path])
+
+
+def test_a_file_is_read_up_to_its_limit(tmp_path):
+    path = tmp_path / "file.txt"
+    path.write_bytes(b"12345")
+    (tmp_path / "link").symlink_to(path)
+    assert read_bytes(path, 5) == b"12345"
+    assert read_bytes(tmp_path / "link", 5, follow=True) == b"12345"
+    with pytest.raises(FileError, match="has 5 bytes, and no more than 4 are read"):
+        read_bytes(path, 4)
+
+
+@pytest.mark.parametrize(
+    ("make", "what"),
+    [
+        (lambda path: None, "No such file"),
+        (lambda path: path.mkdir(), "it is a folder where"),
+        (lambda path: path.symlink_to(__file__), "it is a link, which may lead anywhere, where"),
+        (lambda path: path.symlink_to(path.name), "it is a link"),
+        (os.mkfifo, "it is a device or a pipe where"),
+    ],
+)
+def test_what_is_no_file_is_not_even_opened(make, what, tmp_path):
+    make(tmp_path / "thing")
+    with pytest.raises(RunError, match=what):
+        read_bytes(tmp_path / "thing", 10**6, refusal=RunError)
+
+
+def test_a_link_that_a_person_names_is_followed_but_to_files_only():
+    with pytest.raises(FileError, match="it is a device or a pipe where"):
+        read_bytes("/dev/zero", 10**6, follow=True)

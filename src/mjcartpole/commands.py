@@ -7,8 +7,10 @@ from pathlib import Path
 
 from mjcartpole.envs.backend import Backend, check_backend
 from mjcartpole.errors import RunError
+from mjcartpole.files import is_file
 from mjcartpole.integrator import Integrator
 from mjcartpole.learning import runs
+from mjcartpole.learning.documents import read_summary
 from mjcartpole.learning.policy import Policy
 from mjcartpole.physics.model import ModelLike, load_model
 from mjcartpole.physics.simulation import silence_mujoco
@@ -96,7 +98,7 @@ def median_seed(folder: Path) -> tuple[Path, int]:
         raise RunError(
             f"no seed in '{folder}' is complete; go on with `mjcartpole train --resume {folder}`"
         )
-    means = {run: float(runs.read_summary(run)["evaluation"]["mean"]) for run in complete}
+    means = {run: float(read_summary(run)["evaluation"]["mean"]) for run in complete}
     ranked = sorted(complete, key=means.__getitem__)
     return ranked[(len(ranked) - 1) // 2], len(ranked)
 
@@ -118,7 +120,7 @@ def set_stage(source: Path, choice: Choice) -> Stage:
     backend: Backend
     integrator: Integrator
     run: runs.Run | None = None
-    if source.is_file():
+    if is_file(source):
         # Every run's own is called policy.json: its folder tells them apart.
         name = _run_name(source.parent) if source.name == runs.POLICY else source.stem
         policy = Policy.load(source)

@@ -1,17 +1,26 @@
-"""Files that are written whole or not at all."""
+"""Files that are written whole or not at all, and read as if somebody else had put them there."""
 
 import contextlib
 import functools
 import os
 import re
+import stat
 from collections.abc import Iterator, Sequence
+from io import BufferedReader
 from pathlib import Path
+from typing import Final
 
 from mjcartpole.errors import FileError
 from mjcartpole.leftovers import temporary_beside
 
+_NO_WAITING: Final = getattr(os, "O_NONBLOCK", 0)
+_NO_LINK: Final = getattr(os, "O_NOFOLLOW", 0)
+
 _TEMPORARY = re.compile(r"\.[\w.-]+-[0-9a-f]{8}(\.\w+)?")
 """What `temporary_beside` calls them."""
+
+_LONGEST: Final = 300
+"""Characters of what an error says."""
 
 
 @contextlib.contextmanager
@@ -44,6 +53,111 @@ def write_whole(path: str | os.PathLike[str], text: str) -> None:
         temporary.write_bytes(text.encode("utf-8", "backslashreplace"))
 
 
+@contextlib.contextmanager
+def opened(
+    path: str | os.PathLike[str],
+    most: int,
+    *,
+    follow: bool = False,
+    refusal: type[FileError] = FileError,
+) -> Iterator[BufferedReader]:
+    """Open a regular file to be read; what is none is not even opened.
+
+    Args:
+        path: Where it is.
+        most: Bytes that it may have.
+        follow: Take a link for what it leads to, as where a person names it.
+        refusal: What is raised.
+
+    Raises:
+        FileError: It cannot be read, is no regular file, or too large.
+    """
+    extra = _NO_WAITING | (0 if follow else _NO_LINK)
+    try:
+        _check_regular(Path(path).stat(follow_symlinks=follow), most)
+        with open(path, "rb", opener=lambda name, flags: os.open(name, flags | extra)) as file:
+            _check_regular(os.fstat(file.fileno()), most)
+            yield file
+    except (OSError, ValueError) as error:
+        raise refusal(f"'{path}' cannot be read: {brief(error)}") from error
+
+
+def read_bytes(
+    path: str | os.PathLike[str],
+    most: int,
+    *,
+    follow: bool = False,
+    refusal: type[FileError] = FileError,
+) -> bytes:
+    """The content of a file; see `opened`.
+
+    Raises:
+        FileError: See `opened`.
+    """
+    with opened(path, most, follow=follow, refusal=refusal) as file:
+        return file.read(most)
+
+
+def _check_regular(found: os.stat_result, most: int) -> None:
+    if not stat.S_ISREG(found.st_mode):
+        kinds = {stat.S_IFLNK: "a link, which may lead anywhere,", stat.S_IFDIR: "a folder"}
+        kind = kinds.get(stat.S_IFMT(found.st_mode), "a device or a pipe")
+        raise ValueError(f"it is {kind} where a plain file is needed")
+    if found.st_size > most:
+        raise ValueError(f"it has {found.st_size:,} bytes, and no more than {most:,} are read")
+
+
+def brief(error: Exception) -> str:
+    """What an error says, in one line of bounded length."""
+    message = error.strerror if isinstance(error, OSError) else None
+    words = " ".join((message or str(error)[:1_000]).split())
+    return words if len(words) <= _LONGEST else f"{words[:_LONGEST]}…"
+
+
+def names_in(folder: Path) -> set[str]:
+    """Names of what lies in a folder; none where there is no folder.
+
+    Raises:
+        FileError: It cannot be read.
+    """
+    try:
+        return {path.name for path in folder.iterdir()}
+    except (FileNotFoundError, NotADirectoryError):
+        return set()
+    except OSError as error:
+        raise FileError(f"cannot read the folder '{folder}': {brief(error)}") from error
+
+
+def remove(path: Path) -> None:
+    """Remove a file, if it is there; of a link, the link.
+
+    Raises:
+        FileError: It cannot be removed, or is a folder.
+    """
+    try:
+        path.unlink(missing_ok=True)
+    except OSError as error:
+        raise FileError(f"cannot remove '{path}': {brief(error)}") from error
+
+
+def is_file(path: Path) -> bool:
+    """Whether a regular file, or a link to one, can be seen there."""
+    return stat.S_ISREG(_mode(path, follow=True))
+
+
+def is_folder(path: Path, *, follow: bool = True) -> bool:
+    """Whether a folder, or a link to one, can be seen there."""
+    return stat.S_ISDIR(_mode(path, follow=follow))
+
+
+def _mode(path: Path, *, follow: bool) -> int:
+    # Path.is_file and its like raise where a folder above may not be searched.
+    try:
+        return path.stat(follow_symlinks=follow).st_mode
+    except (OSError, ValueError):
+        return 0
+
+
 def make_folder(path: str | os.PathLike[str]) -> Path:
     """Make a folder and its parents, if they are not there, and return it.
 
@@ -54,7 +168,7 @@ def make_folder(path: str | os.PathLike[str]) -> Path:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise FileError(f"cannot make the folder '{folder}': {_reason(error)}") from error
+        raise FileError(f"cannot make the folder '{folder}': {brief(error)}") from error
     return folder
 
 
@@ -95,9 +209,9 @@ def free_path(path: Path, suffixes: Sequence[str] = ()) -> Path:
 
 def remove_leftovers(folder: Path) -> None:
     """Remove temporary files of writers that were killed; nobody may be writing there now."""
-    for path in folder.iterdir():
-        if is_temporary(path.name) and path.is_file():
-            path.unlink()
+    for name in names_in(folder):
+        if is_temporary(name) and not is_folder(folder / name):
+            remove(folder / name)
 
 
 def is_temporary(name: str) -> bool:
@@ -108,7 +222,7 @@ def is_temporary(name: str) -> bool:
 @contextlib.contextmanager
 def _temporary(target: Path) -> Iterator[Path]:
     make_folder(target.parent)
-    if target.is_dir():
+    if is_folder(target):
         raise FileError(f"cannot write '{target}': it is a folder; give the path of a file")
     try:
         with temporary_beside(target, functools.partial(Path.touch, exist_ok=False)) as temporary:
@@ -117,7 +231,7 @@ def _temporary(target: Path) -> Iterator[Path]:
             finally:
                 temporary.unlink(missing_ok=True)
     except OSError as error:
-        raise FileError(f"cannot write '{target}': {_reason(error)}") from error
+        raise FileError(f"cannot write '{target}': {brief(error)}") from error
 
 
 def sync(path: Path) -> None:
@@ -129,7 +243,3 @@ def sync(path: Path) -> None:
         os.fsync(handle)
     finally:
         os.close(handle)
-
-
-def _reason(error: OSError) -> str:
-    return error.strerror or str(error)

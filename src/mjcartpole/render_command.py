@@ -14,6 +14,7 @@ from mjcartpole.commands import VIDEOS, Choice, counted, median_seed, set_stage
 from mjcartpole.errors import FileError, RenderError, RunError
 from mjcartpole.files import check_free, check_writable, free_path, replacing
 from mjcartpole.learning import runs
+from mjcartpole.learning.documents import read_summary
 from mjcartpole.learning.naming import shortened
 from mjcartpole.learning.training import TrainResult
 from mjcartpole.media.encoders import find_ffmpeg
@@ -135,7 +136,7 @@ def film_result(
 def remove_film(folder: Path) -> None:
     """Remove the film of a run that is about to be replaced, if it is where training puts it."""
     with contextlib.suppress(RunError):
-        path = _own_film(folder, runs.read_summary(folder))
+        path = _own_film(folder, read_summary(folder))
         if path is not None:
             path.unlink(missing_ok=True)
 

@@ -20,12 +20,13 @@ from rich.text import Text
 
 from mjcartpole.commands import RUNS, VIDEOS, counted, print_evaluation, print_seeds
 from mjcartpole.errors import ConfigError
-from mjcartpole.files import check_writable, make_folder
+from mjcartpole.files import check_writable, is_file, make_folder
 from mjcartpole.learning import runs, tensorboard
 from mjcartpole.learning.checkpoints import LATEST
 from mjcartpole.learning.config import TrainConfig
+from mjcartpole.learning.documents import CONFIG
 from mjcartpole.learning.engine import Engine, compiling
-from mjcartpole.learning.folders import free_folder, locked_folder
+from mjcartpole.learning.folders import SEEDS, free_folder
 from mjcartpole.learning.naming import in_flags, namesakes, run_name
 from mjcartpole.learning.session import CHECKPOINT_EVERY, Session, check_interval
 from mjcartpole.learning.training import Training, TrainResult
@@ -126,14 +127,13 @@ def run_resume(path: Path, how: How) -> int:
     """
     silence_mujoco()
     _check(how)
-    if (path / seed_runs.SEEDS).is_file():
+    if SEEDS in runs.content_of(path):
         return _resume_seeds(path, how)
     if how.workers is not None:
         raise ConfigError("--workers is for several --seeds")
     folder = runs.run_folder(path)
-    if path.is_dir() and runs.is_complete(folder):
-        with locked_folder(folder):
-            pass  # A lock that a killed training has left goes.
+    if path == folder and runs.is_complete(folder):
+        runs.check_complete(folder, how.allow_assets)
         print(f"{folder} is complete: nothing is left to do{_unfinished(folder)}")
         return 0
     signals = StopSignals()
@@ -249,7 +249,7 @@ def _changes(preset: str, config: TrainConfig) -> str:
 
 def _unfinished(folder: Path) -> str:
     """How to go on with runs of the same name, but for its number, that are not complete."""
-    begun = [path for path in namesakes(folder) if (path / runs.CONFIG).is_file()]
+    begun = [path for path in namesakes(folder) if is_file(path / CONFIG)]
     hints = [_resume(path) for path in begun if path != folder and not runs.is_complete(path)]
     return f"; unfinished beside it: {', '.join(hints)}" if hints else ""
 

@@ -191,7 +191,7 @@ def test_one_of_another_model_is_refused(content, scratch):
 
 def test_what_is_not_there_or_no_file_is_refused(tmp_path):
     assert "No such file" in assert_refused(tmp_path / "nothing")
-    assert "directory" in assert_refused(tmp_path)
+    assert "it is a folder" in assert_refused(tmp_path)
 
 
 class Trap:

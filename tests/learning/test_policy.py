@@ -133,3 +133,11 @@ def test_a_path_that_leads_nowhere(tmp_path):
         Policy.load(tmp_path)
     with pytest.raises(FileError, match="cannot write"):
         some_policy().save(tmp_path)
+
+
+@pytest.mark.parametrize("bins", [(3,), (1, 3), (1, 3, 6, 8, 2), (1, 3, 6, 8, 2, 2)])
+def test_a_policy_plays_only_where_the_observation_is_its_own(bins):
+    grid = Discretizer(bins, (-1.0,) * len(bins), (1.0,) * len(bins))
+    policy = Policy(grid, np.zeros((*bins, 2)))
+    with pytest.raises(ConfigError, match=r"the policy is for .*, and here has 1 pole"):
+        policy.check_fits(1, "here")

@@ -8,12 +8,31 @@ import json
 import pytest
 
 from mjcartpole.errors import CheckpointError, FileError, ModelError, PolicyFileError, RunError
-from mjcartpole.learning import folders, runs
+from mjcartpole.learning import documents, folders, runs
 from mjcartpole.learning.checkpoints import LATEST, PREVIOUS
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.session import Session
 from mjcartpole.learning.training import Training, train
 from mjcartpole.physics.model import load_model, same_model
+
+SUMMARY = {
+    "preset": "article",
+    "backend": "mujoco",
+    "model": "cartpole",
+    "seed": 3,
+    "episodes": 12,
+    "interrupted": False,
+    "steps": 200,
+    "mean_return_last_100": 16.5,
+    "evaluation": {
+        "backend": "mujoco",
+        "seed": 1_000_000,
+        "episodes": 100,
+        "mean": 20.5,
+        "minimum": 9.0,
+        "endings": {"time limit": 0, "off the track": 1, "pole fell": 99},
+    },
+}
 
 
 @pytest.fixture(scope="module")
@@ -26,7 +45,7 @@ def run(result, tmp_path):
     folder = tmp_path / "run"
     with runs.claimed_folder(folder):
         runs.begin_run(folder, result.config, load_model(), preset="article", video=True)
-        runs.write_results(folder, result, {"episodes": 12})
+        runs.write_results(folder, result, SUMMARY)
     return folder
 
 
@@ -92,7 +111,7 @@ def test_free_folders_are_counted(tmp_path):
     assert folders.free_folder(tmp_path, "a").name == "a-3"
 
 
-@pytest.mark.parametrize("name", [runs.CONFIG, runs.MODEL, runs.POLICY])
+@pytest.mark.parametrize("name", [documents.CONFIG, runs.MODEL, runs.POLICY])
 def test_a_missing_file_is_named(run, name):
     (run / name).unlink()
     with pytest.raises(RunError, match=f"{name} missing"):
@@ -109,7 +128,7 @@ def test_a_folder_that_is_not_there(tmp_path):
     ["", "{", "[]", "{}", '{"preset": "tuned", "bins": 3}', '{"preset": "x", "unknown": 1}'],
 )
 def test_a_damaged_config_is_refused(run, text):
-    (run / runs.CONFIG).write_text(text)
+    (run / documents.CONFIG).write_text(text)
     with pytest.raises(RunError, match="not the config of a run, or is damaged"):
         runs.load_run(run)
 
@@ -261,12 +280,13 @@ def test_a_folder_is_locked_once(begun):
 
 def test_a_run_is_complete_when_its_checkpoints_are_gone(begun, result):
     assert not runs.is_complete(begun)
-    runs.write_results(begun, result, {"episodes": 12})
+    runs.write_results(begun, result, SUMMARY)
     assert not runs.is_complete(begun)
     runs.finish_run(begun)
     assert runs.is_complete(begun)
     assert sorted(path.name for path in begun.iterdir()) == sorted(runs.FILES)
-    assert runs.read_summary(begun) == {"episodes": 12}
+    assert documents.read_summary(begun) == SUMMARY
+    assert runs.check_complete(begun) == (result.config, SUMMARY["evaluation"])
     assert runs.load_run(begun).preset == "article"
 
 
@@ -277,11 +297,11 @@ def test_a_run_without_results_says_how_to_go_on(begun):
 
 @pytest.mark.parametrize("text", ["", "{", None])
 def test_a_summary_that_cannot_be_read(run, text):
-    (run / runs.SUMMARY).unlink()
+    (run / documents.SUMMARY).unlink()
     if text is not None:
-        (run / runs.SUMMARY).write_text(text)
+        (run / documents.SUMMARY).write_text(text)
     with pytest.raises(RunError, match=r"summary\.json' cannot be read"):
-        runs.read_summary(run)
+        documents.read_summary(run)
 
 
 def test_beginning_again_mixes_nothing_with_the_older_run(begun, result):
@@ -325,3 +345,40 @@ def test_files_of_somebody_else_are_never_taken(names, overwrite, tmp_path):
     with pytest.raises(RunError, match="holds other files"):
         claim(tmp_path, overwrite=overwrite)
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(names)
+
+
+@pytest.mark.parametrize("document", ["cartpole", "long", "elsewhere.xml", "/etc/passwd", ""])
+def test_a_stored_model_is_never_taken_for_a_name_or_a_path(document, begun, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "elsewhere.xml").write_text("a secret")
+    (begun / runs.MODEL).write_text(document)
+    with pytest.raises(ModelError, match="the stored model is not a valid MJCF") as refused:
+        resumed(begun)
+    assert "secret" not in str(refused.value)
+
+
+def test_a_complete_run_is_read_before_it_is_said_to_be_so(run, result):
+    assert runs.check_complete(run) == (result.config, SUMMARY["evaluation"])
+    summary = run / documents.SUMMARY
+    for change, why in (
+        ({"interrupted": True}, "not over"),
+        ({"seed": 4}, "seed of another training"),
+        ({"evaluation": {}}, "is missing"),
+    ):
+        summary.write_text(json.dumps({**SUMMARY, **change}))
+        with pytest.raises(RunError, match=why):
+            runs.check_complete(run)
+    summary.write_text(json.dumps(SUMMARY))
+    (run / documents.CONFIG).write_text("{}")
+    with pytest.raises(RunError, match="is not the config of a run"):
+        runs.check_complete(run)
+
+
+def test_a_folder_in_the_place_of_a_file_is_told_before_anything_is_lost(begun):
+    (begun / runs.POLICY).mkdir()
+    before = sorted(begun.iterdir())
+    with pytest.raises(RunError, match="is a folder where a run has a file"):
+        resumed(begun)
+    with pytest.raises(RunError, match="is a folder where a run has a file"):
+        claim(begun, overwrite=True)
+    assert sorted(begun.iterdir()) == before

@@ -5,7 +5,7 @@ import json
 import pytest
 
 from mjcartpole.errors import FileError, RunError
-from mjcartpole.learning import folders, runs
+from mjcartpole.learning import documents, folders, runs
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.episodes import Episode
 from mjcartpole.physics.model import load_model, same_model
@@ -50,7 +50,7 @@ def test_what_many_seeds_leave(tmp_path):
         assert runs.is_complete(folder)
         run = runs.load_run(folder)
         assert (run.config, run.preset) == (found.result.config, "article")
-        assert runs.read_summary(folder)["evaluation"] == found.evaluation.summary()
+        assert documents.read_summary(folder)["evaluation"] == found.evaluation.summary()
 
 
 def test_a_seed_that_is_complete_on_disk_has_the_same_evaluation(tmp_path):
@@ -174,3 +174,52 @@ def test_damaged_seeds_are_refused(text, tmp_path):
         seed_runs.resumed_seeds(tmp_path),
     ):
         pass
+
+
+@pytest.mark.parametrize("seeds", [[], [1, 1], [-1], list(range(100_001))])
+def test_seeds_are_held_to_their_limits_on_resume_and_overwrite(seeds, tmp_path):
+    train_in(tmp_path)
+    path = tmp_path / seed_runs.SEEDS
+    path.write_text(json.dumps({**json.loads(path.read_text()), "seeds": seeds}))
+    with pytest.raises(RunError, match="must be"), seed_runs.resumed_seeds(tmp_path):
+        pass
+    with pytest.raises(RunError, match="must be"):
+        claim(tmp_path, overwrite=True)
+
+
+def test_a_complete_seed_of_another_config_is_not_counted(tmp_path):
+    train_in(tmp_path)
+    crew = Crew(TrainConfig(episodes=6, backend="gym", seed=2), 2, load_model(), folder=tmp_path)
+    for _ in crew.run(lambda: False):
+        pass
+    assert all("another config" in found.error for found in crew.result().failed)
+    assert len(crew.result().failed) == 2
+
+
+@pytest.mark.parametrize("overwrite", [False, True])
+def test_a_seed_that_is_a_link_is_refused_and_nothing_is_lost(overwrite, tmp_path):
+    folder, mine = tmp_path / "many", tmp_path / "mine"
+    train_in(folder)
+    (folder / "seed-2").rename(mine)
+    (folder / "seed-2").symlink_to(mine)
+    before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+    if overwrite:
+        with pytest.raises(RunError, match="seed-2' is a link"):
+            claim(folder, overwrite=True)
+    else:
+        crew = Crew(CONFIG, 2, load_model(), folder=folder)
+        for _ in crew.run(lambda: False):
+            pass
+        assert ["is a link" in found.error for found in crew.result().seeds] == [True, False]
+    assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == before
+
+
+def test_an_overwriting_that_was_killed_is_gone_on_with(tmp_path):
+    train_in(tmp_path)
+    (tmp_path / "seed-2" / "config.json").unlink()
+    train_in(tmp_path, overwrite=True)
+    (tmp_path / seed_runs.SEEDS).unlink()
+    for seed in (2, 3):
+        runs.remove_run(tmp_path / f"seed-{seed}")
+    train_in(tmp_path)
+    assert names(tmp_path) == sorted([*OURS, "seed-2", "seed-3"])

@@ -12,44 +12,63 @@ disk that is full, leaves the ones before.
 """
 
 import dataclasses
+import functools
 import hashlib
 import io
 import json
+import os
+import shutil
 import zipfile
-import zlib
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from mjcartpole.errors import CheckpointError
-from mjcartpole.files import replacing, sync
+from mjcartpole.files import brief, names_in, opened, replacing, sync
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.episodes import ENDINGS, Columns
+from mjcartpole.learning.stored import Fields, checked, parse
 from mjcartpole.learning.training import Snapshot
 from mjcartpole.task import N_ACTIONS
 
 LATEST, PREVIOUS = "checkpoint.bin", "checkpoint-previous.bin"
 
 _HEAD: Final = b"mjcartpole checkpoint 1 "
-_DIGEST_LENGTH: Final = 64
+_LINE_LENGTH: Final = len(_HEAD) + 64 + 1
 _NOT_UNDERSTOOD: Final = (
     ArithmeticError,
-    AttributeError,
     EOFError,
     LookupError,
-    MemoryError,
     NotImplementedError,
     OSError,
     RecursionError,
+    RuntimeError,
     TypeError,
     ValueError,
     zipfile.BadZipFile,
-    zlib.error,
 )
 """What reading an archive that somebody else put together may raise."""
+
+_FRAME: Final = 2**20
+"""Bytes of a checkpoint beside its table and its columns, and more than enough."""
+_EPISODE_BYTES: Final = 13
+
+_GENERATOR: Final[Fields] = {
+    "bit_generator": Literal["PCG64"],
+    "state": {"state": int, "inc": int},
+    "has_uint32": int,
+    "uinteger": int,
+}
+_ABOUT: Final[Fields] = {
+    "config": TrainConfig.fields(),
+    "model": str,
+    "env_rng": _GENERATOR,
+    "learner_rng": _GENERATOR,
+    "seconds": float,
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +108,7 @@ def save_checkpoint(folder: Path, checkpoint: Checkpoint) -> None:
         temporary.write_bytes(content)
         sync(temporary)
         # Killed right here, a training goes on from the previous one, which is as good.
-        if latest.exists():
+        if os.path.lexists(latest):
             latest.replace(previous)
 
 
@@ -107,23 +126,64 @@ def load_checkpoint(
     Raises:
         CheckpointError: It is not there, damaged, or of another training.
     """
+    n_states = config.discretizer(poles).n_states
+    most = n_states * N_ACTIONS * 8 + config.episodes * _EPISODE_BYTES + _FRAME
+    with opened(path, most, refusal=CheckpointError) as file:
+        if not (line := file.readline(_LINE_LENGTH)).startswith(_HEAD):
+            raise CheckpointError(f"'{path}' is no checkpoint of this version of mjcartpole")
+        if line != _line(hashlib.file_digest(file, "sha256").hexdigest()):
+            raise CheckpointError(
+                f"'{path}' is cut off or was altered: its checksum does not match"
+            )
+        try:
+            with zipfile.ZipFile(file) as archive:
+                about = checked(parse(_array(archive, "about", np.uint8, _FRAME).tobytes()), _ABOUT)
+                its, model = TrainConfig(**about["config"]), about["model"]
+                _check_same(path, its, model, config, document)
+                return Checkpoint(its, model, _snapshot(archive, about, its, n_states))
+        except _NOT_UNDERSTOOD as error:
+            reason = brief(error) or type(error).__name__
+            raise CheckpointError(f"'{path}' cannot be understood: {reason}") from error
+
+
+def choose_checkpoint(
+    folder: Path, path: Path, config: TrainConfig, document: str, *, poles: int
+) -> Checkpoint | None:
+    """Where a training goes on: at its latest checkpoint, or the one that was asked for.
+
+    Args:
+        folder: The run folder.
+        path: The same, or a checkpoint in it.
+        config: See `load_checkpoint`, here and below.
+        document: The model.
+        poles: How many that has.
+
+    Returns:
+        None where there is none.
+
+    Raises:
+        CheckpointError: It is damaged; the message offers the previous one, if that is good.
+    """
+    latest, previous, content = folder / LATEST, folder / PREVIOUS, names_in(folder)
+    load = functools.partial(load_checkpoint, config=config, document=document, poles=poles)
+    if path != folder:
+        return load(path)
+    if LATEST not in content:
+        # Nothing was saved yet, or it was killed between two moves (see save_checkpoint).
+        return load(previous) if PREVIOUS in content else None
     try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise CheckpointError(f"'{path}' cannot be read: {error.strerror}") from error
-    if not content.startswith(_HEAD):
-        raise CheckpointError(f"'{path}' is no checkpoint of this version of mjcartpole")
-    start = len(_HEAD) + _DIGEST_LENGTH + 1
-    archive = content[start:]
-    if content[:start] != _line(archive):
-        raise CheckpointError(f"'{path}' is cut off or was altered: its checksum does not match")
-    try:
-        checkpoint = _unpack(archive, poles)
-    except _NOT_UNDERSTOOD as error:
-        reason = " ".join(str(error).split()) or type(error).__name__
-        raise CheckpointError(f"'{path}' cannot be understood: {reason}") from error
-    _check_same(path, checkpoint, config, document)
-    return checkpoint
+        return load(latest)
+    except CheckpointError as error:
+        try:
+            older = load(previous)
+        except CheckpointError:
+            hint = "there is no good one before it; start again with --overwrite"
+        else:
+            hint = (
+                f"the one before it, after {older.episodes:,} episodes, is good: "
+                f"mjcartpole train --resume {previous}"
+            )
+        raise CheckpointError(f"{error}; {hint}") from error
 
 
 def keep_only(folder: Path, path: Path) -> None:
@@ -134,22 +194,24 @@ def keep_only(folder: Path, path: Path) -> None:
     """
     if path.absolute() != (folder / LATEST).absolute():
         with replacing(folder / LATEST) as temporary:
-            temporary.write_bytes(path.read_bytes())
+            shutil.copyfile(path, temporary, follow_symlinks=False)
 
 
-def _check_same(path: Path, checkpoint: Checkpoint, config: TrainConfig, document: str) -> None:
-    ours, its = dataclasses.asdict(config), dataclasses.asdict(checkpoint.config)
+def _check_same(
+    path: Path, its_config: TrainConfig, its_model: str, config: TrainConfig, document: str
+) -> None:
+    ours, its = dataclasses.asdict(config), dataclasses.asdict(its_config)
     other = [
         f"{name} {its[name]!r}, not {ours[name]!r}" for name in ours if ours[name] != its[name]
     ]
     if other:
-        raise CheckpointError(f"'{path}' is of another training: {'; '.join(other)}")
-    if checkpoint.model != checksum(document):
+        raise CheckpointError(f"'{path}' is of another training: {'; '.join(other)[:300]}")
+    if its_model != checksum(document):
         raise CheckpointError(f"'{path}' is of another model than the one that lies beside it")
 
 
-def _line(archive: bytes) -> bytes:
-    return _HEAD + hashlib.sha256(archive).hexdigest().encode() + b"\n"
+def _line(digest: str) -> bytes:
+    return _HEAD + digest.encode() + b"\n"
 
 
 def _pack(checkpoint: Checkpoint) -> bytes:
@@ -169,42 +231,61 @@ def _pack(checkpoint: Checkpoint) -> bytes:
         **snapshot.columns._asdict(),
     )
     content = archive.getvalue()
-    return _line(content) + content
+    return _line(hashlib.sha256(content).hexdigest()) + content
 
 
-def _unpack(content: bytes, poles: int) -> Checkpoint:
-    with np.load(io.BytesIO(content), allow_pickle=False) as archive:
-        about: dict[str, Any] = json.loads(archive["about"].tobytes())
-        snapshot = Snapshot(
-            q_table=archive["q_table"],
-            env_rng=about["env_rng"],
-            learner_rng=about["learner_rng"],
-            columns=Columns(archive["totals"], archive["steps"], archive["endings"]),
-            seconds=float(about["seconds"]),
-        )
-    config = TrainConfig(**about["config"])
-    _check_snapshot(snapshot, config, poles)
-    return Checkpoint(config, str(about["model"]), snapshot)
+def _snapshot(
+    archive: zipfile.ZipFile, about: dict[str, Any], config: TrainConfig, n_states: int
+) -> Snapshot:
+    columns = Columns(
+        _array(archive, "totals", np.float64, config.episodes),
+        _array(archive, "steps", np.int32, config.episodes),
+        _array(archive, "endings", np.int8, config.episodes),
+    )
+    table = _array(archive, "q_table", np.float64, n_states, N_ACTIONS)
+    seconds = float(about["seconds"])
+    snapshot = Snapshot(table, about["env_rng"], about["learner_rng"], columns, seconds)
+    _check_snapshot(snapshot, n_states)
+    return snapshot
 
 
-def _check_snapshot(snapshot: Snapshot, config: TrainConfig, poles: int) -> None:
-    """Refuse numbers that no training with this config can have come to.
+def _array(
+    archive: zipfile.ZipFile, name: str, kind: npt.DTypeLike, most: int, *others: int
+) -> npt.NDArray[Any]:
+    """An array of an archive, of shape (at most `most`, *others).
+
+    What it claims to be is looked at before any memory is taken for it.
+    """
+    if archive.getinfo(f"{name}.npy").compress_type != zipfile.ZIP_STORED:
+        raise ValueError(f"{name} is compressed")
+    with archive.open(f"{name}.npy") as member:
+        np.lib.format.read_magic(member)
+        shape, in_columns, found = np.lib.format.read_array_header_1_0(member)
+        if found != kind or in_columns or len(shape) != 1 + len(others) or shape[1:] != others:
+            raise ValueError(f"{name} is of {found} with shape {shape}")
+        if not 0 <= shape[0] <= most:
+            raise ValueError(f"{name} has {shape[0]} rows, and the training no more than {most}")
+        size = int(np.prod(shape)) * found.itemsize
+        content = member.read(size + 1)
+    if len(content) != size:
+        raise ValueError(f"{name} is not as long as it says")
+    return np.frombuffer(content, kind).reshape(shape)
+
+
+def _check_snapshot(snapshot: Snapshot, n_states: int) -> None:
+    """Refuse numbers that no training can have come to.
 
     Raises:
         ValueError: See above.
     """
-    table, columns = snapshot.q_table, snapshot.columns
-    n = len(columns.totals)
-    expected = {"totals": np.float64, "steps": np.int32, "endings": np.int8}
-    n_states = config.discretizer(poles).n_states
-    if table.dtype != np.float64 or table.shape != (n_states, N_ACTIONS):
-        raise ValueError(f"a table of {table.dtype} with shape {table.shape}")
-    arrays: dict[str, npt.NDArray[Any]] = columns._asdict()
-    if any(
-        arrays[name].dtype != kind or arrays[name].shape != (n,) for name, kind in expected.items()
-    ):
+    table, (totals, steps, endings) = snapshot.q_table, snapshot.columns
+    if len(table) != n_states or not np.isfinite(table).all():
+        raise ValueError(f"a table with {len(table)} rows, or values that are not finite")
+    if not len(totals) == len(steps) == len(endings):
         raise ValueError("columns of episodes that do not fit together")
-    if n > config.episodes or not np.isin(columns.endings, range(len(ENDINGS))).all():
+    if not (np.isfinite(totals).all() and (steps > 0).all()):
+        raise ValueError("episodes without steps, or without a return")
+    if not np.isin(endings, range(len(ENDINGS))).all() or snapshot.seconds < 0:
         raise ValueError("episodes that the training does not have")
     states: tuple[Any, Any] = (snapshot.env_rng, snapshot.learner_rng)
     for state in states:

@@ -17,8 +17,13 @@ from mjcartpole.learning.qlearning import Ties
 if TYPE_CHECKING:
     from mjcartpole.physics.model import CartPole
 
+MAX_SEED: Final = 2**128 - 1
+"""A generator's state has as many bits."""
+
 MAX_EPISODES: Final = 1_000_000_000
 """More than anybody waits for; the log of so many takes 13 GB."""
+
+_MOST: Final = {"episodes": MAX_EPISODES, "log_every": MAX_EPISODES, "seed": MAX_SEED}
 
 _GRID: Final = ("bins", "low", "high")
 _DIMENSIONS: Final = len(task.state_names())
@@ -142,7 +147,7 @@ class TrainConfig:
         """
         if name not in PRESETS:
             raise ConfigError(f"preset '{name}' is unknown; available: {', '.join(PRESETS)}")
-        known = [field.name for field in dataclasses.fields(cls)]
+        known = cls.fields()
         unknown = sorted(set(changes) - set(known))
         if unknown:
             raise ConfigError(
@@ -156,6 +161,11 @@ class TrainConfig:
         values = ((field, getattr(self, field.name)) for field in fields)
         changed = [f"{field.name}={value!r}" for field, value in values if value != field.default]
         return f"TrainConfig({', '.join(changed)})"
+
+    @classmethod
+    def fields(cls) -> dict[str, Any]:
+        """Each field's type, by name."""
+        return {field.name: field.type for field in dataclasses.fields(cls)}
 
     def load_model(self) -> "CartPole":
         """The model that the config names; for backend gym the reference, which is drawn for it.
@@ -207,8 +217,9 @@ class TrainConfig:
             value = getattr(self, name)
             if type(value) is not int or value < least:
                 raise ConfigError(f"{name} must be a whole number from {least} up, not {value!r}")
-        if self.episodes > MAX_EPISODES:
-            raise ConfigError(f"episodes must be at most {MAX_EPISODES:,}, not {self.episodes:,}")
+        for name, most in _MOST.items():
+            if getattr(self, name) > most:
+                raise ConfigError(f"{name} must be at most {most:,}; this one is larger")
 
     def _check_numbers(self) -> None:
         names = ["gamma", "alpha", "alpha_final", "epsilon", "epsilon_final", "decay"]

@@ -1,6 +1,7 @@
 """From a continuous observation to the row of a table."""
 
 import math
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple, TypeAlias
@@ -110,4 +111,5 @@ class Discretizer:
 
 def is_finite(value: object) -> bool:
     """Whether a value is a number, and neither infinite nor NaN."""
-    return isinstance(value, int | float) and math.isfinite(value)
+    # math.isfinite fails for a whole number that no float can hold.
+    return isinstance(value, int | float) and abs(value) <= sys.float_info.max

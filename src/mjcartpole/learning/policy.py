@@ -7,21 +7,35 @@ so reading it runs no code. Floats are written so that they read back bit for bi
 import hashlib
 import json
 import os
+import reprlib
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
 from mjcartpole.errors import ConfigError, PolicyFileError
-from mjcartpole.files import write_whole
+from mjcartpole.files import brief, read_bytes, write_whole
 from mjcartpole.learning.discretizer import Discretizer
-from mjcartpole.task import N_ACTIONS, in_words
+from mjcartpole.learning.stored import checked, parse
+from mjcartpole.task import N_ACTIONS, in_words, state_names
 
 FORMAT = "mjcartpole-policy"
 VERSION = 1
+
+_MOST_BYTES: Final = 2**26
+"""The largest table, with all digits, takes 56 MB."""
+
+_FIELDS: Final = {
+    "format": str,
+    "version": int,
+    "sha256": str,
+    "bins": tuple[int, ...],
+    "low": tuple[float, ...],
+    "high": tuple[float, ...],
+    "q_table": tuple[tuple[float, ...], ...],
+}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -76,10 +90,12 @@ class Policy:
         Raises:
             ConfigError: See above.
         """
-        if self.poles != poles:
+        n = len(self.discretizer.bins)
+        if n != len(state_names(poles)):
+            whole = n % 2 == 0 and self.poles > 0
+            what = in_words(self.poles) if whole else f"observations of {n} values"
             raise ConfigError(
-                f"the policy is for {in_words(self.poles)}, and {where} has {in_words(poles)}; "
-                "train one there"
+                f"the policy is for {what}, and {where} has {in_words(poles)}; train one there"
             )
 
     def save(self, path: str | os.PathLike[str]) -> None:
@@ -91,22 +107,19 @@ class Policy:
         write_whole(path, _to_text(self))
 
     @classmethod
-    def load(cls, path: str | os.PathLike[str]) -> "Policy":
+    def load(cls, path: str | os.PathLike[str], *, follow: bool = True) -> "Policy":
         """Read a policy.
+
+        Args:
+            path: Its file.
+            follow: Take a link for the file that it leads to.
 
         Raises:
             PolicyFileError: The file is not there, is no policy, or was changed or damaged.
         """
-        try:
-            text = Path(path).read_bytes().decode("utf-8")
-        except OSError as error:
-            raise PolicyFileError(
-                f"policy file '{path}' cannot be read: {error.strerror}"
-            ) from error
-        except UnicodeDecodeError as error:
-            raise _no_policy(path, "it is not text") from error
-        policy = _from_text(text, path)
-        if _to_text(policy) != text:
+        content = read_bytes(path, _MOST_BYTES, follow=follow, refusal=PolicyFileError)
+        policy = _from_json(content, path)
+        if _to_text(policy).encode() != content:
             raise PolicyFileError(
                 f"policy file '{path}' is damaged or was edited: its checksum does not match; "
                 "restore it from a copy, or train again"
@@ -129,19 +142,20 @@ def _to_text(policy: Policy) -> str:
     return "{\n" + "\n".join(lines) + f'\n"q_table": [\n{rows}\n]\n}}\n'
 
 
-def _from_text(text: str, path: str | os.PathLike[str]) -> Policy:
+def _from_json(content: bytes, path: str | os.PathLike[str]) -> Policy:
     try:
-        document: dict[str, Any] = json.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise _no_policy(path, "it is not JSON, or is cut off") from error
+        document = parse(content)
+    except ValueError as error:
+        raise _no_policy(path, f"it is not JSON, or is cut off ({brief(error)})") from error
     if not isinstance(document, dict) or document.get("format") != FORMAT:
         raise _no_policy(path, f'it lacks \'"format": "{FORMAT}"\'')
     if document.get("version") != VERSION:
         raise PolicyFileError(
-            f"policy file '{path}' has version {document.get('version')}; "
+            f"policy file '{path}' has version {reprlib.repr(document.get('version'))}; "
             f"this mjcartpole reads version {VERSION}"
         )
     try:
+        checked(document, _FIELDS)
         discretizer = Discretizer(
             bins=tuple(document["bins"]),
             low=tuple(float(value) for value in document["low"]),
@@ -149,8 +163,8 @@ def _from_text(text: str, path: str | os.PathLike[str]) -> Policy:
         )
         table = np.array(document["q_table"], dtype=np.float64)
         return Policy(discretizer, table.reshape(*discretizer.bins, N_ACTIONS))
-    except (KeyError, TypeError, ValueError, OverflowError) as error:
-        raise PolicyFileError(f"policy file '{path}' is damaged: {error}") from error
+    except (ValueError, OverflowError) as error:
+        raise PolicyFileError(f"policy file '{path}' is damaged: {brief(error)}") from error
 
 
 def _no_policy(path: str | os.PathLike[str], why: str) -> PolicyFileError:

@@ -14,7 +14,7 @@ summary.json    what came out
 
 import contextlib
 import dataclasses
-import functools
+import fnmatch
 import json
 import os
 import platform
@@ -25,10 +25,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from mjcartpole.errors import CheckpointError, ConfigError, ModelError, RunError
+from mjcartpole.errors import ModelError, RunError
 from mjcartpole.files import (
+    brief,
+    is_file,
+    is_folder,
     is_temporary,
-    remove_leftovers,
+    names_in,
+    read_bytes,
+    remove,
     replacing,
     write_whole,
 )
@@ -36,26 +41,29 @@ from mjcartpole.learning.checkpoints import (
     LATEST,
     PREVIOUS,
     Checkpoint,
+    choose_checkpoint,
     keep_only,
-    load_checkpoint,
-)
+)  # fmt: skip
 from mjcartpole.learning.config import TrainConfig
+from mjcartpole.learning.documents import CONFIG, SUMMARY, read_config, read_figures
 from mjcartpole.learning.folders import LOCK, held_folder, locked_folder
 from mjcartpole.learning.policy import Policy
 from mjcartpole.learning.training import TrainResult
 from mjcartpole.physics.assets import is_stored, name_by_content
 from mjcartpole.physics.model import CartPole, load_stored, same_model
-from mjcartpole.physics.reading import read_text
 from mjcartpole.versions import version_of
 
-CONFIG, VERSIONS, MODEL = "config.json", "versions.json", "model.xml"
-EPISODES, POLICY, SUMMARY, TIMING = "episodes.csv", "policy.json", "summary.json", "timing.json"
+VERSIONS, MODEL = "versions.json", "model.xml"
+EPISODES, POLICY, TIMING = "episodes.csv", "policy.json", "timing.json"
 BEGINNING: Final = (VERSIONS, MODEL, CONFIG)
 """In the order of writing: what a kill leaves of them is known by the versions."""
 RESULTS: Final = (EPISODES, POLICY, TIMING, SUMMARY)
 FILES: Final = (*BEGINNING, *RESULTS)
 EVENTS: Final = "events.out.tfevents.*"
 """TensorBoard's (see tensorboard.py)."""
+
+_LARGEST_MODEL: Final = 2**24
+"""Bytes."""
 
 PACKAGES: Final = ("mjcartpole", "mujoco", "dm-control", "gymnasium", "numpy", "numba", "imageio")
 
@@ -94,7 +102,7 @@ class Run:
             ModelError: It cannot be used, or names a file elsewhere.
         """
         return load_stored(
-            read_text(self.model),
+            _read_document(self.folder),
             str(self.model),
             self.folder,
             allow_assets,
@@ -173,7 +181,6 @@ def begin_run(
     Raises:
         FileError: The folder cannot be written.
     """
-    # The config first: without it a folder holds no run, so that two are never mixed.
     _remove_files(folder, keep=cartpole.stored[1])
     write_versions(folder)
     write_model(folder, cartpole)
@@ -240,19 +247,6 @@ def write_summary(folder: Path, summary: dict[str, Any]) -> None:
     write_whole(folder / SUMMARY, _json(summary))
 
 
-def read_summary(folder: Path) -> dict[str, Any]:
-    """A run's summary.
-
-    Raises:
-        RunError: It is not there or damaged.
-    """
-    try:
-        summary: dict[str, Any] = json.loads((folder / SUMMARY).read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise RunError(f"'{folder / SUMMARY}' cannot be read: {error}") from error
-    return summary
-
-
 def finish_run(folder: Path) -> None:
     """Drop the checkpoints of a run that is complete."""
     _remove(folder, (PREVIOUS, LATEST))
@@ -264,11 +258,10 @@ def remove_run(folder: Path) -> None:
     Raises:
         RunError: A training is at work in it.
     """
-    if not folder.is_dir():
+    if not is_folder(folder, follow=False):
         return
     with locked_folder(folder):
         _remove_files(folder)
-        remove_leftovers(folder)
     with contextlib.suppress(OSError):
         folder.rmdir()  # Only an empty one goes.
 
@@ -281,7 +274,21 @@ def is_complete(folder: Path) -> bool:
 
 def has_events(folder: Path) -> bool:
     """Whether TensorBoard events were written for a run."""
-    return any(folder.glob(EVENTS))
+    return bool(fnmatch.filter(names_in(folder), EVENTS))
+
+
+def check_complete(folder: Path, allow_assets: Sequence[Path] = ()) -> Run:
+    """Read all of a run that is complete, and clear what a kill at its very end has left.
+
+    Raises:
+        RunError: It is damaged, or another training is at work in it.
+        ModelError: Its model was damaged, or names a file elsewhere.
+    """
+    with locked_folder(folder):
+        run = load_run(folder)
+        read_model(folder, run.config, allow_assets)
+        read_figures(folder, run.config)
+        return run
 
 
 def load_run(folder: str | os.PathLike[str]) -> Run:
@@ -292,14 +299,16 @@ def load_run(folder: str | os.PathLike[str]) -> Run:
         PolicyFileError: Its policy is damaged.
     """
     path = Path(folder)
-    if not path.is_dir():
+    if not is_folder(path):
         raise RunError(f"no run folder or policy file '{path}'; `mjcartpole train` makes a run")
-    missing = [name for name in (CONFIG, MODEL, POLICY) if not (path / name).is_file()]
+    content = content_of(path)
+    missing = [name for name in (CONFIG, MODEL, POLICY) if name not in content]
     if missing:
         hint = f"; go on with `mjcartpole train --resume {path}`" if CONFIG not in missing else ""
         raise RunError(f"'{path}' is no complete run folder: {', '.join(missing)} missing{hint}")
-    policy = Policy.load(path / POLICY)
-    preset, _, config = _read_config(path / CONFIG)
+    policy = Policy.load(path / POLICY, follow=False)
+    preset, _, config = read_config(path)
+    _read_document(path)
     return Run(path, preset, config, policy)
 
 
@@ -318,12 +327,18 @@ def resumed_folder(path: Path, allow_assets: Sequence[Path] = ()) -> Iterator[Be
         ModelError: The model was damaged.
     """
     folder = run_folder(path)
+    content = content_of(folder)
+    if CONFIG not in content:
+        raise RunError(
+            f"'{folder}' holds no training that could be continued; start one with "
+            f"`mjcartpole train --run-dir {folder}`"
+        )
+    _check_files(folder, content)
     with locked_folder(folder):
-        remove_leftovers(folder)
         begun = _load_begun(folder, path, allow_assets)
         if begun.checkpoint is not None:
             # The one that was chosen is now the latest, and a damaged one takes no place again.
-            keep_only(folder, path if path.is_file() else folder / LATEST)
+            keep_only(folder, path if path != folder else folder / LATEST)
         yield begun
 
 
@@ -341,6 +356,7 @@ def stored_model(
     Raises:
         ModelError: The document was damaged, or names a file elsewhere.
     """
+    # Never by `load_model`, which would take some texts for a model's name or a path.
     cartpole = load_stored(
         document,
         f"'{folder / MODEL}'",
@@ -351,19 +367,29 @@ def stored_model(
     return dataclasses.replace(cartpole, name=config.model)
 
 
-def _load_begun(folder: Path, path: Path, allow_assets: Sequence[Path]) -> Begun:
-    if not (folder / CONFIG).is_file():
-        raise RunError(
-            f"'{folder}' holds no training that could be continued; start one with "
-            f"`mjcartpole train --run-dir {folder}`"
-        )
-    preset, video, config = _read_config(folder / CONFIG)
+def read_model(folder: Path, config: TrainConfig, allow_assets: Sequence[Path] = ()) -> CartPole:
+    """The model that a run folder stores; see `stored_model`.
+
+    Raises:
+        RunError: It cannot be read.
+        ModelError: It was damaged, or names a file elsewhere.
+    """
+    return stored_model(_read_document(folder), config, folder, allow_assets)
+
+
+def _read_document(folder: Path) -> str:
+    content = read_bytes(folder / MODEL, _LARGEST_MODEL, refusal=RunError)
     try:
-        document = (folder / MODEL).read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise RunError(f"'{folder / MODEL}' cannot be read: {error}") from error
+        return content.decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise RunError(f"'{folder / MODEL}' cannot be read: {brief(error)}") from error
+
+
+def _load_begun(folder: Path, path: Path, allow_assets: Sequence[Path]) -> Begun:
+    preset, video, config = read_config(folder)
+    document = _read_document(folder)
     cartpole = stored_model(document, config, folder, allow_assets)
-    checkpoint = _checkpoint(folder, path, config, document, cartpole.poles)
+    checkpoint = choose_checkpoint(folder, path, config, document, poles=cartpole.poles)
     return Begun(folder, preset, video, config, cartpole, checkpoint)
 
 
@@ -373,9 +399,9 @@ def run_folder(path: Path) -> Path:
     Raises:
         RunError: There is neither.
     """
-    if path.is_dir():
+    if is_folder(path):
         return path
-    if path.is_file():
+    if is_file(path):
         return path.parent
     raise RunError(f"no run folder or checkpoint '{path}'; `mjcartpole train` makes a run")
 
@@ -386,31 +412,6 @@ def versions() -> dict[str, str]:
     return found | {package: version_of(package) or "not installed" for package in PACKAGES}
 
 
-def _checkpoint(
-    folder: Path, path: Path, config: TrainConfig, document: str, poles: int
-) -> Checkpoint | None:
-    latest, previous = folder / LATEST, folder / PREVIOUS
-    load = functools.partial(load_checkpoint, config=config, document=document, poles=poles)
-    if path.is_file():
-        return load(path)
-    if not latest.exists():
-        # Nothing was saved yet, or it was killed between two moves (see save_checkpoint).
-        return load(previous) if previous.exists() else None
-    try:
-        return load(latest)
-    except CheckpointError as error:
-        try:
-            older = load(previous)
-        except CheckpointError:
-            hint = "there is no good one before it; start again with --overwrite"
-        else:
-            hint = (
-                f"the one before it, after {older.episodes:,} episodes, is good: "
-                f"mjcartpole train --resume {previous}"
-            )
-        raise CheckpointError(f"{error}; {hint}") from error
-
-
 def _check_free(folder: Path, overwrite: bool) -> None:
     content = content_of(folder)
     # A training that was killed in its first moment leaves no config: nothing is lost with it.
@@ -418,6 +419,7 @@ def _check_free(folder: Path, overwrite: bool) -> None:
     killed = VERSIONS in content and content <= {MODEL, VERSIONS, LATEST, PREVIOUS}
     if not content or killed:
         return
+    _check_files(folder, content)
     if CONFIG not in content and not content & set(RESULTS):
         raise RunError(f"'{folder}' holds other files and is no run; choose another --run-dir")
     if not overwrite:
@@ -428,35 +430,35 @@ def _check_free(folder: Path, overwrite: bool) -> None:
         )
 
 
+def _check_files(folder: Path, content: set[str]) -> None:
+    """Refuse folders where a run has files, before any work is lost to them."""
+    for name in _own(content):
+        if is_folder(folder / name, follow=False):
+            raise RunError(f"'{folder / name}' is a folder where a run has a file; move it away")
+
+
 def content_of(folder: Path) -> set[str]:
     """Names of what lies in a folder, without what a killed training may have left behind."""
-    if not folder.is_dir():
-        return set()
-    names = {path.name for path in folder.iterdir()} - {LOCK}
-    return {name for name in names if not is_temporary(name) and not is_stored(name)}
+    names = {name for name in names_in(folder) if not is_temporary(name)} - {LOCK}
+    return {name for name in names if not is_stored(name)}
 
 
 def _remove(folder: Path, names: Iterable[str]) -> None:
     for name in names:
-        (folder / name).unlink(missing_ok=True)
+        remove(folder / name)
+
+
+def _own(content: set[str]) -> list[str]:
+    """Names of a run's files, those of `content` among them, in the order of their removal."""
+    # The config first: without it a folder holds no run, so that two are never mixed.
+    events = fnmatch.filter(content, EVENTS)
+    return [CONFIG, MODEL, *events, *RESULTS, LATEST, PREVIOUS, VERSIONS]
 
 
 def _remove_files(folder: Path, keep: Iterable[str] = ()) -> None:
     """Remove all files of a run but for some of its model's, the config first."""
-    events = (path.name for path in folder.glob(EVENTS))
-    _remove(folder, (CONFIG, MODEL, *events, *RESULTS, LATEST, PREVIOUS, VERSIONS))
+    _remove(folder, _own(names_in(folder)))
     remove_assets(folder, keep)
-
-
-def _read_config(path: Path) -> tuple[str, bool, TrainConfig]:
-    """Preset, whether there is a video, and config."""
-    try:
-        values: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-        preset, video = str(values.pop("preset")), bool(values.pop("video", False))
-        lists = {key: tuple(value) for key, value in values.items() if isinstance(value, list)}
-        return preset, video, TrainConfig(**{**values, **lists})
-    except (OSError, ValueError, TypeError, KeyError, AttributeError, ConfigError) as error:
-        raise RunError(f"'{path}' is not the config of a run, or is damaged: {error}") from error
 
 
 def _json(values: dict[str, Any]) -> str:

@@ -7,6 +7,7 @@ from typing import Any
 from mjcartpole.errors import RunError
 from mjcartpole.learning import runs, tensorboard
 from mjcartpole.learning.config import TrainConfig
+from mjcartpole.learning.documents import read_summary
 from mjcartpole.learning.engine import Engine
 from mjcartpole.learning.policy import Policy
 from mjcartpole.learning.session import Session
@@ -65,7 +66,7 @@ def evaluate_where_trained(
 def _film_of(folder: Path) -> dict[str, Any]:
     """The film that this training had begun when it was stopped: it keeps its name."""
     with contextlib.suppress(RunError):
-        summary = runs.read_summary(folder)
+        summary = read_summary(folder)
         return {"video": summary["video"]} if "video" in summary else {}
     return {}
 

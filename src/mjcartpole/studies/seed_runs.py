@@ -16,16 +16,20 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from mjcartpole.errors import ConfigError, ModelError, RunError
-from mjcartpole.files import remove_leftovers, write_whole
+from mjcartpole.errors import RunError
+from mjcartpole.files import is_file, remove, write_whole
 from mjcartpole.learning import runs
 from mjcartpole.learning.config import TrainConfig
-from mjcartpole.learning.folders import held_folder, locked_folder
+from mjcartpole.learning.folders import SEEDS, check_here, held_folder, locked_folder
+from mjcartpole.learning.stored import Fields, read_document
 from mjcartpole.physics.model import CartPole
-from mjcartpole.studies.seeds import ManyResult
+from mjcartpole.studies.seeds import ManyResult, check_seeds, seed_folder
 
-SEEDS, TABLE, AGGREGATE = "seeds.json", "seeds.csv", "aggregate.json"
+TABLE, AGGREGATE = "seeds.csv", "aggregate.json"
 FILES: Final = (SEEDS, TABLE, AGGREGATE, runs.MODEL, runs.VERSIONS)
+"""In the order of removal: without the seeds a folder holds nothing, and the versions say whose."""
+
+_FIELDS: Final[Fields] = {"preset": str, "seeds": tuple[int, ...], "config": TrainConfig.fields()}
 
 
 @dataclass(frozen=True)
@@ -45,14 +49,9 @@ class ManyBegun:
     cartpole: CartPole
 
 
-def seed_folder(folder: Path, seed: int) -> Path:
-    """Where one seed's run lies."""
-    return folder / f"seed-{seed}"
-
-
 def is_seeds(path: Path) -> bool:
     """Whether a path is a folder of many seeds."""
-    return (path / SEEDS).is_file()
+    return is_file(path / SEEDS)
 
 
 def learned_seeds(folder: Path) -> tuple[dict[int, Path], list[int]]:
@@ -61,8 +60,8 @@ def learned_seeds(folder: Path) -> tuple[dict[int, Path], list[int]]:
     Raises:
         RunError: There is no policy yet, or the folder is damaged.
     """
-    runs_of = {seed: seed_folder(folder, seed) for seed in _load(folder).seeds}
-    learned = {seed: run for seed, run in runs_of.items() if (run / runs.POLICY).is_file()}
+    runs_of = {seed: seed_folder(folder, seed) for seed in _read_seeds(folder)[2]}
+    learned = {seed: run for seed, run in runs_of.items() if runs.POLICY in runs.content_of(run)}
     if not learned:
         raise RunError(
             f"no seed in '{folder}' has a policy yet; go on with "
@@ -82,8 +81,7 @@ def claimed_seeds(folder: Path, *, overwrite: bool = False) -> Iterator[None]:
     _check_free(folder, overwrite)
     with held_folder(folder):
         _check_free(folder, overwrite)
-        if (folder / SEEDS).exists():
-            _clear(folder)
+        _clear(folder)
         yield
 
 
@@ -113,8 +111,9 @@ def resumed_seeds(folder: Path, allow_assets: Sequence[Path] = ()) -> Iterator[M
         RunError: It is damaged, or another training is at work in it.
     """
     with locked_folder(folder):
-        remove_leftovers(folder)
-        yield _load(folder, allow_assets)
+        preset, config, seeds = _read_seeds(folder)
+        cartpole = runs.read_model(folder, config, allow_assets)
+        yield ManyBegun(preset, config, seeds, cartpole)
 
 
 def write_seeds(folder: Path, many: ManyResult) -> None:
@@ -145,7 +144,7 @@ def _csv(many: ManyResult) -> str:
 def _check_free(folder: Path, overwrite: bool) -> None:
     content = runs.content_of(folder)
     # Killed in its first moment: see runs.py.
-    killed = runs.VERSIONS in content and content <= {runs.MODEL, runs.VERSIONS}
+    killed = runs.VERSIONS in content and SEEDS not in content and content <= set(FILES)
     if not content or killed:
         return
     if SEEDS not in content:
@@ -161,24 +160,23 @@ def _check_free(folder: Path, overwrite: bool) -> None:
 
 def _clear(folder: Path) -> None:
     """Remove the runs of all seeds that a folder names, and nothing else."""
-    for seed in _load(folder).seeds:
-        runs.remove_run(seed_folder(folder, seed))
+    if SEEDS in runs.content_of(folder):
+        before = [seed_folder(folder, seed) for seed in _read_seeds(folder)[2]]
+        for each in before:
+            check_here(each)
+        for each in before:
+            runs.remove_run(each)
     for name in FILES:
-        (folder / name).unlink(missing_ok=True)
+        remove(folder / name)
     runs.remove_assets(folder)
 
 
-def _load(folder: Path, allow_assets: Sequence[Path] = ()) -> ManyBegun:
-    path = folder / SEEDS
-    try:
-        about: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+def _read_seeds(folder: Path) -> tuple[str, TrainConfig, tuple[int, ...]]:
+    """Preset, config and seeds."""
+
+    def made(about: dict[str, Any]) -> tuple[str, TrainConfig, tuple[int, ...]]:
         config = TrainConfig(**about["config"])
-        seeds = tuple(int(seed) for seed in about["seeds"])
-        document = (folder / runs.MODEL).read_text(encoding="utf-8")
-        cartpole = runs.stored_model(document, config, folder, allow_assets)
-        preset = str(about["preset"])
-    except (OSError, ValueError, TypeError, KeyError, ConfigError, ModelError) as error:
-        raise RunError(
-            f"'{path}' does not name the seeds of a run, or is damaged: {error}"
-        ) from error
-    return ManyBegun(preset, config, seeds, cartpole)
+        return about["preset"], config, check_seeds(config, about["seeds"])
+
+    otherwise = "does not name the seeds of a run, or is damaged"
+    return read_document(folder / SEEDS, _FIELDS, made, otherwise)

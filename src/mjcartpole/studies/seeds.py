@@ -5,6 +5,7 @@ import contextlib
 import dataclasses
 import multiprocessing
 import os
+import reprlib
 import signal
 import sys
 import threading
@@ -18,6 +19,7 @@ from mjcartpole.errors import ConfigError, MjCartPoleError, RunError
 from mjcartpole.learning import runs
 from mjcartpole.learning.checkpoints import Checkpoint
 from mjcartpole.learning.config import TrainConfig
+from mjcartpole.learning.documents import CONFIG
 from mjcartpole.learning.engine import Engine, choose_engine
 from mjcartpole.learning.session import CHECKPOINT_EVERY, Session
 from mjcartpole.learning.training import Training, TrainResult
@@ -146,7 +148,7 @@ class Crew:
         Raises:
             ConfigError: The seeds or workers make no sense.
         """
-        self.seeds = _check_seeds(config, seeds)
+        self.seeds = check_seeds(config, seeds)
         self.workers = min(_check_workers(workers), len(self.seeds))
         self._config = config
         on_mujoco = config.backend == "mujoco"
@@ -156,7 +158,7 @@ class Crew:
                 config=dataclasses.replace(config, seed=seed),
                 engine=self._engine,
                 document=cartpole.xml if on_mujoco else None,
-                folder=None if folder is None else folder / f"seed-{seed}",
+                folder=None if folder is None else seed_folder(folder, seed),
                 preset=preset,
                 every=every,
                 events=events,
@@ -307,8 +309,10 @@ def _train_on_disk(
 ) -> SeedResult:
     seed = job.config.seed
     if runs.is_complete(folder):
-        policy = runs.load_run(folder).policy
-        return SeedResult(seed, evaluate_where_trained(policy, job.config, cartpole, job.engine))
+        run = runs.check_complete(folder, job.allow_assets)
+        _check_same(job, folder, run.config)
+        again = evaluate_where_trained(run.policy, job.config, cartpole, job.engine)
+        return SeedResult(seed, again)
     training = Training(job.config, engine=job.engine, cartpole=cartpole)
     session = Session(folder, training, cartpole, every=job.every)
     with _begun(job, folder, cartpole) as checkpoint:
@@ -327,24 +331,44 @@ def _train_on_disk(
 @contextlib.contextmanager
 def _begun(job: _Job, folder: Path, cartpole: CartPole) -> Iterator[Checkpoint | None]:
     """Hold a seed's folder; yields where to go on."""
-    if (folder / runs.CONFIG).is_file():
+    if CONFIG in runs.content_of(folder):
         with runs.resumed_folder(folder, job.allow_assets) as begun:
-            if begun.config != job.config:
-                raise RunError(f"'{folder}' holds a run with another config")
+            _check_same(job, folder, begun.config)
             yield begun.checkpoint
     else:
-        with runs.claimed_folder(folder):
+        # What else lies there is the rest of a run whose removal was cut short.
+        with runs.claimed_folder(folder, overwrite=True):
             runs.begin_run(folder, job.config, cartpole, preset=job.preset)
             yield None
 
 
-def _check_seeds(config: TrainConfig, seeds: int | Sequence[int]) -> tuple[int, ...]:
+def _check_same(job: _Job, folder: Path, config: TrainConfig) -> None:
+    if config != job.config:
+        raise RunError(f"'{folder}' holds a run with another config")
+
+
+def seed_folder(folder: Path, seed: int) -> Path:
+    """Where one seed's run lies in the folder of many."""
+    return folder / f"seed-{seed}"
+
+
+def check_seeds(config: TrainConfig, seeds: int | Sequence[int]) -> tuple[int, ...]:
+    """The seeds that are meant; a number stands for that many from the config's own on.
+
+    Raises:
+        ConfigError: They are too many, none, the same twice, or no seeds.
+    """
     if isinstance(seeds, int):
         if not 1 <= seeds <= MAX_SEEDS:
             raise ConfigError(f"seeds must be a number from 1 to {MAX_SEEDS:,}, not {seeds}")
-        return tuple(range(config.seed, config.seed + seeds))
-    if not seeds or len(set(seeds)) != len(seeds):
-        raise ConfigError(f"seeds must be different numbers, at least one, not {list(seeds)}")
+        seeds = range(config.seed, config.seed + seeds)
+    if not 1 <= len(seeds) <= MAX_SEEDS or len(set(seeds)) != len(seeds):
+        raise ConfigError(
+            f"seeds must be different numbers, at least one and at most {MAX_SEEDS:,}, "
+            f"not {reprlib.repr(list(seeds))}"
+        )
+    for seed in (min(seeds), max(seeds)):
+        _ = dataclasses.replace(config, seed=seed)
     return tuple(seeds)
 
 
