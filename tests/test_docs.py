@@ -216,13 +216,23 @@ class Reader:
     def follows(self, page: str, *, only: set[str] | None = None) -> None:
         """Do what the page says, once each, in its order; of that, only what is named."""
         printed: dict[str, str] = {}
+        left_out = {*NOT_HERE, *lacking()}
         for block in blocks(page):
-            chosen = block.name in only if only else block.name not in {*NOT_HERE, *lacking()}
-            if block.kind == "plain" and PRINTED.get(block.name) in printed:
-                shown = machine_free(printed[PRINTED[block.name]])
-                assert shown == machine_free(block.text), f"{page} shows otherwise:\n{shown}"
+            chosen = block.name not in left_out if only is None else block.name in only
+            if block.kind == "plain":
+                self.sees(block, printed, everything=only is None)
             elif chosen and block.name not in printed:
                 printed[block.name] = self.does(block)
+
+    @staticmethod
+    def sees(block: Block, printed: dict[str, str], *, everything: bool) -> None:
+        """Compare a block with what its command has printed, if it shows that of one."""
+        command = PRINTED.get(block.name)
+        if everything and command:
+            assert command in printed, f"{command} comes too late"
+        if command in printed:
+            shown = machine_free(printed[command])
+            assert machine_free(block.text) == shown, f"{command} prints otherwise:\n{shown}"
 
     def does(self, block: Block) -> str:
         """Run a block; return what it prints."""
