@@ -2,8 +2,8 @@
 
     python -m benchmarks.bench [--quick] [--json FILE] [--only SECTION …]
 
-Medians over repeats, with the lowest and the highest. Sections: step, vector, training, seeds,
-start, memory. What the figures mean, and where each microsecond goes: docs/performance.md.
+Medians over repeats, with the lowest and the highest. Sections: step, vector, threads, training,
+seeds, start, memory. What the figures mean, and where each microsecond goes: docs/performance.md.
 """
 
 import argparse
@@ -21,7 +21,7 @@ import gymnasium
 import numpy as np
 from benchmarks.article import train_like_the_article
 from benchmarks.others import GymnasiumMujoco, raw_steps
-from benchmarks.ratios import Ratio, compare
+from benchmarks.ratios import Ratio, compare, seconds
 from mujoco.batch import Batch
 
 import mjcartpole
@@ -30,9 +30,9 @@ from mjcartpole.files import write_whole
 from mjcartpole.learning import runs
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.training import Training, train
+from mjcartpole.physics.batch_simulation import available_cores
 from mjcartpole.physics.model import load_model
 from mjcartpole.studies.many import train_many
-from mjcartpole.studies.seeds import available_cores
 
 Section = Callable[[bool], Iterator[Ratio]]
 
@@ -110,6 +110,27 @@ def vector(quick: bool) -> Iterator[Ratio]:
     name = "64 environments against gymnasium's SyncVectorEnv of ours"
     works = (_play_vector(made, 5 * blocks) for made in (envs, sync))
     yield compare("vector", name, *works, repeats=5 if quick else 15)
+
+
+def threads(quick: bool) -> Iterator[Ratio]:
+    """The vector's own choice of threads against one, and against all cores.
+
+    Blocks are short, so that most of them run without another program in between.
+    """
+    repeats, block = (41, 0.002) if quick else (301, 0.004)
+    for substeps in (1, 10, 100):
+        for n in (1, 2, 4, 16, 64, 128, 256, 512, 1_024, 4_096):
+            edits = {"option.timestep": 0.02 / substeps}
+            envs = [
+                gymnasium.make_vec(mjcartpole.ENV_ID, n, threads=count, edits=edits)
+                for count in (None, 1, available_cores())
+            ]
+            # The first steps hold the first trial.
+            length = [seconds(_play_vector(each, 20)) / 20 for each in envs][1]
+            own, *others = (_play_vector(each, max(1, round(block / length))) for each in envs)
+            for words, other in zip(("one thread", "all"), others, strict=True):
+                name = f"{n} environments of {substeps} physics steps against {words}"
+                yield compare("threads", name, own, other, repeats=repeats, wanted=0.95)
 
 
 def _play_vector(envs: gymnasium.vector.VectorEnv[Any, Any, Any], steps: int) -> Callable[[], None]:
@@ -231,6 +252,7 @@ def memory(quick: bool) -> None:
 SECTIONS: dict[str, Section] = {
     "step": step,
     "vector": vector,
+    "threads": threads,
     "training": training,
     "seeds": seeds,
     "start": start,

@@ -14,7 +14,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from mjcartpole.files import make_folder
-from mjcartpole.physics import equations
+from mjcartpole.physics import linear
 from mjcartpole.physics.model import load_model
 from mjcartpole.studies.parity import Subject
 from mjcartpole.studies.parity.convergence import METHODS, energy_track
@@ -31,7 +31,7 @@ def plot_growth(subject: Subject, path: Path) -> None:
         axes.semilogy(steps, np.maximum(run.error, EPS / 4), color="tab:blue", lw=0.6, alpha=0.6)
     longest = max(runs, key=lambda run: len(run.error))
     steps = np.arange(1, len(longest.error) + 1)
-    rho = equations.spectral_radius(subject.reference, "gym")
+    rho = linear.spectral_radius(subject.reference, "gym")
     axes.semilogy([], [], color="tab:blue", label="measured, 20 episodes")
     axes.semilogy(steps, EPS * rho**steps, "k--", lw=1, label=f"eps rho^t, rho = {rho:.4f}")
     axes.semilogy(steps, longest.predicted, color="tab:red", lw=1, label="predicted bound")

@@ -19,5 +19,7 @@ def _quiet_mujoco():
 
 
 def pytest_configure():
-    """Hear Ctrl-C, also where the tests run in the background, which starts with it ignored."""
+    """Hear signals, also where the tests run in the background or under nohup: some ignored."""
     signal.signal(signal.SIGINT, signal.default_int_handler)
+    if hasattr(signal, "SIGHUP"):
+        signal.signal(signal.SIGHUP, signal.SIG_DFL)

@@ -14,6 +14,7 @@ LAYERS = [
     "errors",
     "task",
     "integrator",
+    "leftovers",
     "files",
     "versions",
     "physics",
@@ -24,6 +25,7 @@ LAYERS = [
 ]
 TOP = {
     "signals",
+    "output",
     "commands",
     "train_command",
     "render_command",
@@ -36,7 +38,7 @@ TOP = {
     "__main__",
     "__init__",
 }
-MUJOCO_HOMES = ("physics/", "media/", "envs/vector.py")
+MUJOCO_HOMES = ("physics/", "media/")
 
 SOURCES = sorted(PACKAGE.rglob("*.py"))
 

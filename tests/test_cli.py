@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
 
@@ -53,6 +54,39 @@ def test_a_preset_changes_the_defaults(form):
     command = cli.parse(["train", "--backend", "gym", *form, "--episodes", "50"])
     assert command.config == TrainConfig.preset("article", backend="gym", episodes=50)
     assert command.preset == "article"
+
+
+@pytest.mark.parametrize(
+    ("words", "values"),
+    [
+        ("--bins 1,3,6,9", {"bins": (1, 3, 6, 9)}),
+        ("--bins=1,3,6,9 --alpha 0.2", {"bins": (1, 3, 6, 9), "alpha": 0.2}),
+        ("--bins 1, 3, 6, 9", {"bins": (1, 3, 6, 9)}),
+        ("--bins 1,3 6,9", {"bins": (1, 3, 6, 9)}),
+        ("--low -2.4,-1e0,-.2,-1.5 --seed 3", {"low": (-2.4, -1.0, -0.2, -1.5), "seed": 3}),
+        ("--low=-2.4,-1,-.2,-1.5", {"low": (-2.4, -1.0, -0.2, -1.5)}),
+        ("--set pole.length=1.5,pole.mass=0.2", {"set": ("pole.length=1.5", "pole.mass=0.2")}),
+        ("--set=a.b=1,c:d.e=2 f=3", {"set": ("a.b=1", "c:d.e=2", "f=3")}),
+    ],
+)
+def test_commas_part_the_values_of_a_list(words, values):
+    assert cli.parse(["train", *words.split()]).config == TrainConfig(**values)
+
+
+def test_commas_elsewhere(here):
+    assert cli.parse(["parity", "--rungs", "1,2,3", "--quick"]).rungs == (1, 2, 3)
+    command = cli.parse(["transfer", "a,b", "--models", "gym,long", "-o", "c,d"])
+    assert command.models == ("gym", "long")
+    assert ([str(source) for source in command.sources], str(command.output)) == (["a,b"], "c,d")
+    (here / "heavy,long.xml").write_text("<mujoco/>")
+    command = cli.parse(["transfer", "a", "--models", "heavy,long.xml", "gym"])
+    assert command.models == ("heavy,long.xml", "gym")
+
+
+def test_a_list_that_makes_no_sense_is_one_line(here, capsys):
+    for bins in ("1,3,6", "1,x,6,8", "1;3;6;8", ","):
+        code, out, err = call(["train", "--bins", bins], capsys)
+        assert (code, out, err.count("\n")) == (2, "", 1)
 
 
 def test_negative_numbers_are_values():
@@ -133,6 +167,38 @@ def test_rendering_either_backend(run, backend, capsys):
     frames, seconds = frames_of("out.mp4")
     assert frames == steps + 1
     assert seconds == pytest.approx(frames / 50, abs=0.011)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "concat:x.mp4",
+        "pipe:1.mp4",
+        "file:y.mp4",
+        "a|b.mp4",
+        "c%03d.mp4",
+        "-z.mp4",
+        "concat:d/q.mp4",
+    ],
+)
+def test_a_videos_path_is_a_path_whatever_it_looks_like(run, here, name, capsys):
+    code, out, err = call(["render", run, "-o", name, "--size", "64x48"], capsys)
+    assert (code, err) == (0, "")
+    assert f"video  {name}  (" in out
+    written = [str(path.relative_to(here)) for path in here.rglob("*.mp4")]
+    assert written == [name]
+    assert frames_of(here / name)[0] > 5
+
+
+def test_a_file_whose_name_begins_with_a_dash_is_a_file(run, here, capsys):
+    (here / "-mine.xml").write_text(load_model().xml)
+    assert call(["model", "show", "-mine.xml"], capsys)[0] == 0
+    assert (
+        call(["model", "edit", "-mine.xml", "--set=pole.length=1", "-o", "-2.xml"], capsys)[0] == 0
+    )
+    assert (here / "-2.xml").is_file()
+    assert call(["render", run, "-o=-3.gif", "--size", "64x48"], capsys)[0] == 0
+    assert (here / "-3.gif").is_file()
 
 
 def test_training_films_its_first_evaluation_episode(here, capsys):
@@ -287,6 +353,10 @@ def test_help(command, capsys):
     assert "usage: mjcartpole" in out
 
 
+def test_help_tells_of_the_version(capsys):
+    assert "--version" in call(["--help"], capsys)[1]
+
+
 def test_a_run_at_the_files_own_timestep_is_evaluated_as_it_was_trained(here, capsys):
     odd = load_model().xml.replace('timestep="0.02"', 'timestep="0.015"')
     (here / "odd.xml").write_text(odd)
@@ -307,7 +377,106 @@ def test_a_run_at_the_files_own_timestep_is_evaluated_as_it_was_trained(here, ca
     assert (code, "asked for" in error) == (2, True)
 
 
+def test_it_is_said_where_no_policy_can_balance_a_model(here, capsys):
+    train = ["train", "--engine", "python", "--episodes", "3", "--no-video"]
+    words = "no policy can balance this: from 8 of 8 starts every sequence of actions ends"
+    for edits, expected in ((["--set", "force=1000"], 1), ([], 0)):
+        code, out, _ = call(["model", "show", "cartpole", *edits], capsys)
+        assert (code, out.count(words)) == (0, expected)
+        code, _, error = call([*train, *edits], capsys)
+        assert (code, error.count(words), len(error.splitlines())) == (0, expected, expected)
+    assert call([*train, "--backend", "gym"], capsys)[2] == ""
+
+
 def test_the_word_after_set_is_an_edit_even_where_it_is_none(here, capsys):
     code, _, error = call(["model", "show", "cartpole", "--set", "pole.length"], capsys)
     assert code == 2
     assert "'pole.length' is no edit; give NAME=VALUE" in error
+
+
+@pytest.fixture
+def seeds(here, capsys):
+    command = ["train", *QUICK, "--backend", "gym", "--seeds", "3", "--run-dir", "runs/many"]
+    assert call(command, capsys)[0] == 0
+    return here / "runs" / "many"
+
+
+def test_many_seeds_are_evaluated_as_after_training(seeds, capsys):
+    code, out, err = call(["evaluate", "runs/many"], capsys)
+    assert (code, err) == (0, "")
+    assert out.startswith(
+        "\ngreedy evaluation on gym: 3 seeds, 100 episodes each, seed 1000000\n\n"
+    )
+    rows = (seeds / "seeds.csv").read_text().splitlines()[1:]
+    for seed, mean, least, _ in (row.split(",") for row in rows):
+        assert re.search(rf"^ +{seed} +{float(mean):.2f} +{float(least):.0f}$", out, re.M)
+    stored = json.loads((seeds / "aggregate.json").read_text())["greedy_return"]
+    code, out, err = call(["evaluate", "runs/many", "--json"], capsys)
+    figures = json.loads(out)
+    assert (code, err, figures["greedy_return"]) == (0, "", stored)
+    assert [one["train_seed"] for one in figures["seeds"]] == [0, 1, 2]
+    assert {one["seed"] for one in figures["seeds"]} == {1_000_000}
+
+
+def test_many_seeds_are_evaluated_elsewhere(seeds, capsys):
+    where = ["--backend", "mujoco", "--model", "long", "--episodes", "2", "--seed", "5"]
+    code, out, err = call(["evaluate", "runs/many", *where], capsys)
+    assert (code, err) == (0, "")
+    assert "greedy evaluation on mujoco, long: 3 seeds, 2 episodes each, seed 5" in out
+    single = call(["evaluate", "runs/many/seed-1", *where], capsys)[1]
+    assert "greedy evaluation on mujoco, long: 2 episodes, seed 5" in single
+    mean = re.search(r"mean return ([\d.]+)", single)[1]
+    assert re.search(rf"^ +1 +{mean} ", out, re.M)
+
+
+def test_a_seed_without_a_policy_is_named_and_left_out(seeds, capsys):
+    (seeds / "seed-1" / "policy.json").unlink()
+    for command in (["evaluate"], ["transfer", "--models", "gym", "--episodes", "2"]):
+        code, out, err = call([command[0], "runs/many", *command[1:]], capsys)
+        said = "mjcartpole: 1 of 3 seeds in runs/many without a policy, such as seed 1: left out\n"
+        assert (code, err) == (0, said)
+        assert "2 seeds" in out
+    for seed in (0, 2):
+        (seeds / f"seed-{seed}" / "policy.json").unlink()
+    for command in ("evaluate", "render", "transfer"):
+        code, out, err = call([command, "runs/many"], capsys)
+        assert (code, out, err.count("\n")) == (2, "", 1)
+        assert "mjcartpole train --resume runs/many" in err
+
+
+def test_the_median_of_many_seeds_is_filmed(seeds, capsys):
+    rows = [row.split(",") for row in (seeds / "seeds.csv").read_text().splitlines()[1:]]
+    median = sorted((float(mean), int(seed)) for seed, mean, *_ in rows)[1][1]
+    command = ["render", "runs/many", "--size", "64x48"]
+    code, out, err = call([*command, "-o", "film.mp4"], capsys)
+    assert (code, err) == (0, "")
+    folder = f"runs/many/seed-{median}"
+    assert out.startswith(
+        f"{folder}  (the median of 3 seeds by mean greedy return)\nvideo  film.mp4"
+    )
+    assert call(["render", folder, "--size", "64x48", "-o", "alone.mp4"], capsys)[0] == 0
+    assert Path("film.mp4").read_bytes() == Path("alone.mp4").read_bytes()
+    assert f"videos/many-seed-{median}.mp4" in call(command, capsys)[1]
+
+
+def test_many_seeds_are_one_column_of_a_transfer(seeds, capsys):
+    command = ["transfer", "runs/many", "runs/many/seed-2", "--episodes", "4"]
+    code, out, err = call([*command, "--models", "gym,cartpole"], capsys)
+    assert (code, err) == (0, "")
+    assert "many: the mean over 3 seeds, and its interval over seeds" in out
+    cells = json.loads(Path("transfer/transfer.json").read_text())["cells"]
+    by_place = {(cell["policy"], cell["model"]): cell for cell in cells}
+    means = [
+        json.loads(
+            call(["evaluate", f"runs/many/seed-{n}", "--json", "--episodes", "4"], capsys)[1]
+        )
+        for n in range(3)
+    ]
+    all_means = [one["mean"] for one in means]
+    many, alone = by_place["many", "gym"], by_place["many-seed-2", "gym"]
+    assert many["mean"] == pytest.approx(sum(all_means) / 3)
+    assert many["minimum"] == min(one["minimum"] for one in means)
+    assert min(all_means) <= many["low"] <= many["high"] <= max(all_means)
+    assert (many["episodes"], alone["episodes"], alone["mean"]) == (12, 4, all_means[2])
+    assert call(["transfer", "runs/many", "--sweep", "gravity=9:10:1"], capsys)[0] == 0
+    assert json.loads(Path("transfer/sweep-gravity.json").read_text())["holds"].keys() == {"many"}

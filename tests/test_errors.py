@@ -7,7 +7,7 @@ from mjcartpole import errors
 
 def test_all_errors_share_one_base():
     classes = [cls for _, cls in inspect.getmembers(errors, inspect.isclass)]
-    assert len(classes) == 15
+    assert len(classes) == 16
     assert all(issubclass(cls, errors.MjCartPoleError) for cls in classes)
 
 
@@ -16,6 +16,7 @@ def test_errors_that_callers_of_gymnasium_expect():
     assert issubclass(errors.ResetNeededError, AssertionError)
     assert issubclass(errors.ConfigError, ValueError)
     assert issubclass(errors.ModelError, ValueError)
+    assert issubclass(errors.SettingError, AttributeError)
 
 
 def test_the_drawing_names_every_class():

@@ -10,7 +10,9 @@ import pytest
 
 from mjcartpole.errors import FileError
 from mjcartpole.files import (
+    check_free,
     check_writable,
+    free_path,
     is_temporary,
     make_folder,
     remove_leftovers,
@@ -128,3 +130,22 @@ def test_what_a_killed_writer_leaves_is_known_and_removed(name, tmp_path):
 def test_the_probe_of_a_folder_leaves_nothing(tmp_path):
     check_writable(tmp_path)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_free_path_is_counted_past_all_that_is_there(tmp_path):
+    film = tmp_path / "alpha0.1.mp4"
+    assert free_path(film) == film
+    film.write_bytes(b"")
+    assert free_path(film).name == "alpha0.1-2.mp4"
+    (tmp_path / "alpha0.1-2.gif").write_bytes(b"")
+    (tmp_path / "alpha0.1-3.mp4").symlink_to(tmp_path / "nowhere")
+    assert free_path(film, (".gif",)).name == "alpha0.1-4.mp4"
+
+
+def test_only_what_is_there_is_refused(tmp_path):
+    (tmp_path / "empty").mkdir()
+    check_free([tmp_path / "empty", tmp_path / "nothing"])
+    (tmp_path / "empty" / "file").write_bytes(b"")
+    for path in (tmp_path / "empty", tmp_path / "empty" / "file"):
+        with pytest.raises(FileError, match="--overwrite"):
+            check_free([tmp_path / "nothing", path])

@@ -166,7 +166,7 @@ def test_an_episode_ends_when_one_of_them_has_fallen(state, over):
     vector.reset(seed=0)
     states = np.zeros((3, 6))
     states[1] = state
-    vector.state = states
+    vector.state = states.T
     assert vector.step([0, 0, 0])[2].tolist() == [False, over, False]
 
 
@@ -178,7 +178,7 @@ def test_vector_and_dm_control_move_as_the_environment(model, integrator):
     env.reset(seed=5)
     vector = CartPoleVectorEnv(2, model=model, integrator=integrator)
     vector.reset(seed=5)
-    vector.state = np.array([env.state, env.state])
+    vector.state = np.array([env.state, env.state]).T
     suite = dm.load("balance", model=model, seed=5, discrete=True)
     step = suite.reset()
     for action in (1, 0, 0, 1, 1, 0, 1):

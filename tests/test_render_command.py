@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import imageio_ffmpeg
 import numpy as np
@@ -229,6 +230,33 @@ def test_a_pictures_odd_size_stays(runs, capsys):
         assert image.size == (161, 121)
 
 
+def test_a_film_is_never_replaced_unasked(runs, capsys):
+    first = render([runs / "mujoco"], capsys)
+    again = render([runs / "mujoco", "--backend", "gym"], capsys)
+    assert "  videos/mujoco.mp4  " in first
+    assert "  videos/mujoco-2.mp4  " in again
+    before = {path: path.read_bytes() for path in Path("videos").iterdir()}
+    for output in ("videos/mujoco.mp4", "pictures", "sheet.png"):
+        sheet = ["--sheet"] if output.endswith("png") else []
+        arguments = [runs / "mujoco", "-o", output, *sheet]
+        if not output.endswith("mp4"):
+            render(arguments, capsys)
+        code, out, err = call(["render", *arguments, *SMALL], capsys)
+        assert (code, out) == (2, "")
+        expected = f"'{output}' exists; choose another -o, or replace it with --overwrite"
+        assert err == f"mjcartpole: error: {expected}\n"
+        render([*arguments, "--overwrite", "--seed", "3"], capsys)
+    after = {path: path.read_bytes() for path in Path("videos").iterdir()}
+    assert [path.name for path in before if before[path] != after[path]] == ["mujoco.mp4"]
+    assert "  videos/mujoco.mp4  " in render([runs / "mujoco", "--overwrite"], capsys)
+
+
+def test_a_long_name_is_cut(runs, capsys):
+    copy = shutil.copytree(runs / "mujoco", runs / ("y" * 255), dirs_exist_ok=True)
+    assert re.search(r"  videos/y{200,}-[0-9a-f]{8}\.mp4  ", render([copy], capsys))
+    assert re.search(r"  videos/y+-[0-9a-f]{8}-beside-", render([copy] * 3, capsys))
+
+
 MISTAKES = [
     (["--camera", "moon"], "no camera 'moon'; available: side, follow"),
     (["--size", "640"], "--size is a width and a height in pixels, such as 640x480, not '640'"),
@@ -291,9 +319,9 @@ def test_a_folder_that_nobody_can_write_is_one_line(runs, capsys):
     )
 
 
-def start_long(runs, name, **options):
+def start_long(runs, name, *more, **options):
     """Start a film of a thousand frames per control step."""
-    flags = ["-o", f"out/{name}", "--speed", "0.001", *SMALL]
+    flags = ["-o", f"out/{name}", "--speed", "0.001", *SMALL, *more]
     command = [sys.executable, "-m", "mjcartpole", "render", str(runs / "mujoco"), *flags]
     return subprocess.Popen(command, **options)
 
@@ -326,7 +354,7 @@ def test_an_interrupted_film_leaves_nothing(runs, here, name, number, code):
 def test_an_interrupted_mp4_leaves_the_old_one(runs, here, number, code):
     (here / "out").mkdir()
     (here / "out" / "out.mp4").write_bytes(b"old")
-    with start_long(runs, "out.mp4", stderr=subprocess.PIPE, text=True) as process:
+    with start_long(runs, "out.mp4", "--overwrite", stderr=subprocess.PIPE, text=True) as process:
         until = time.monotonic() + 60
         while len(list((here / "out").iterdir())) == 1 and time.monotonic() < until:
             time.sleep(0.01)

@@ -1,8 +1,11 @@
-"""Ctrl-C and SIGTERM."""
+"""Ctrl-C, SIGTERM and SIGHUP."""
 
 import os
 import signal
+import subprocess
+import sys
 import threading
+import time
 
 import pytest
 
@@ -78,3 +81,41 @@ def test_another_thread_leaves_the_signals_alone():
     thread.start()
     thread.join()
     assert seen == [before, False]
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="needs SIGHUP")
+@pytest.mark.parametrize("number", [signal.SIGTERM, getattr(signal, "SIGHUP", 0)])
+def test_a_signal_that_is_ignored_stays_ignored(number):
+    before = signal.signal(number, signal.SIG_IGN)
+    try:
+        signals = StopSignals()
+        with signals.caught():
+            send(number)
+            assert not signals.stop()
+        assert signal.getsignal(number) is signal.SIG_IGN
+    finally:
+        signal.signal(number, before)
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="needs SIGHUP")
+@pytest.mark.parametrize("seeds", ["1", "2"])
+def test_a_terminal_that_is_closed_ends_all_of_a_training_in_order(seeds, tmp_path):
+    command = ["train", "--engine", "python", "--episodes", "100000", "--seeds", seeds]
+    with subprocess.Popen(
+        [sys.executable, "-m", "mjcartpole", *command, "--checkpoint-every", "0", "--run-dir", "r"],
+        cwd=tmp_path,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    ) as process:
+        limit = time.monotonic() + 60
+        while not list(tmp_path.glob("r/**/checkpoint.bin")) and time.monotonic() < limit:
+            time.sleep(0.01)
+        os.killpg(process.pid, signal.SIGHUP)
+        _, err = process.communicate(timeout=60)
+    assert process.returncode == 129
+    assert err.startswith("mjcartpole: interrupted ")
+    assert err.count("\n") == 1
+    assert "go on with: mjcartpole train --resume r" in err
+    assert not list(tmp_path.rglob(".*"))

@@ -9,6 +9,8 @@ import os
 import random
 import re
 import resource
+import select
+import shlex
 import shutil
 import signal
 import subprocess
@@ -741,7 +743,7 @@ def test_each_seed_is_as_if_it_was_trained_alone(alone, capsys):
     code, out, err = call([*FEW, "--seeds", "3", "--workers", "2"], capsys)
     assert (code, err) == (0, "")
     folder = re.search(r"^runs   (\S+)$", out, re.M)[1]
-    assert folder == "runs/tuned-mujoco-seeds3-5"
+    assert folder == "runs/tuned-mujoco-episodes12-seeds3-5"
     assert_equal_seeds(folder)
     summaries = [json.loads(Path(f"alone-{seed}/summary.json").read_text()) for seed in (3, 4, 5)]
     means = [summary["evaluation"]["mean"] for summary in summaries]
@@ -951,15 +953,144 @@ def test_what_training_prints(here, capsys):
     returns = train(TrainConfig(episodes=25)).returns
     for end, block in ((10, returns[:10]), (20, returns[10:20]), (25, returns[20:])):
         assert re.search(rf"^\s+{end}\s+{block.mean():.1f}$", out, re.M)
-    assert "run    runs/tuned-mujoco-seed0" in out
-    assert (here / "runs" / "tuned-mujoco-seed0" / "summary.json").is_file()
+    assert "run    runs/tuned-mujoco-episodes25-log_every10-seed0" in out
+    assert (here / "runs" / "tuned-mujoco-episodes25-log_every10-seed0" / "summary.json").is_file()
     assert not (here / "videos").exists()
 
 
-def test_a_second_training_takes_the_next_free_folder(here, capsys):
-    for name in ("tuned-gym-seed0", "tuned-gym-seed0-2"):
-        assert call(["train", "--backend", "gym", "--episodes", "9", "--no-video"], capsys)[0] == 0
-        assert (here / "runs" / name / "policy.json").is_file()
+NINE = ["train", "--backend", "gym", "--episodes", "9", "--no-video"]
+
+
+def test_a_second_training_says_where_it_goes(here, capsys):
+    first = Path("runs/tuned-gym-episodes9-seed0")
+    assert "is there already" not in call(NINE, capsys)[1]
+    code, out, _ = call(NINE, capsys)
+    assert code == 0
+    assert out.splitlines()[1] == f"{first} is there already: this goes to {first}-2"
+    assert f"run    {first}-2" in out
+    assert contents(first) == contents(f"{first}-2")
+    code, out, _ = call([*NINE, "--overwrite"], capsys)
+    assert (code, "is there already" in out) == (0, False)
+    assert names("runs") == [first.name, f"{first.name}-2"]
+
+
+def test_a_complete_run_names_the_unfinished_one_beside_it(here, capsys):
+    first = Path("runs/tuned-gym-episodes9-seed0")
+    for _ in range(2):
+        call(NINE, capsys)
+    Path(f"{first}-2/summary.json").unlink()
+    hint = f"; unfinished beside it: mjcartpole train --resume {first}-2"
+    code, out, _ = call(["train", "--resume", first], capsys)
+    assert (code, out) == (0, f"{first} is complete: nothing is left to do{hint}\n")
+    assert f"this goes to {first}-3{hint}\n" in call(NINE, capsys)[1]
+
+
+def test_a_hint_names_the_folder_as_a_shell_takes_it(here, fork, capsys):
+    child = fork([*SLOW, "--run-dir", "my run", "--checkpoint-every", "0"])
+    wait_until((here / "my run" / LATEST).exists, child)
+    child.kill(signal.SIGINT)
+    assert child.wait() == 130
+    hint = shlex.split(re.search(r"go on with: mjcartpole (.*)$", child.err.strip())[1])
+    assert hint == ["train", "--resume", "my run"]
+    assert call(hint, capsys)[0] == 0
+
+
+def test_a_header_says_what_was_changed(here, capsys):
+    flags = ["--set", "pole.length=1.5,pole.mass=0.2", "--bins", "1,3,6,9", "--model", "cartpole"]
+    out = call([*SHORT, *flags], capsys)[1]
+    assert out.splitlines()[0] == (
+        "tuned on mujoco: 4 episodes, seed 0, "
+        "with --set pole.length=1.5 pole.mass=0.2 --bins 1,3,6,9"
+    )
+    assert "run    runs/tuned-mujoco-pole.length1.5-pole.mass0.2-episodes4-bins1_3_6_9-seed0" in out
+    assert (
+        "2 at once, with --alpha 0.5"
+        in call([*NINE, "--seeds", "2", "--workers", "2", "--alpha", "0.5"], capsys)[1]
+    )
+
+
+def test_equal_trainings_print_the_same(here, capsys):
+    outs = [call([*NINE, "--run-dir", f"{n}/run"], capsys)[1].replace(f"{n}/", "") for n in "ab"]
+    assert outs[0] == outs[1]
+    assert "per second" not in outs[0]
+
+
+FILM = [*NINE[:-1], "--run-dir"]
+
+
+def test_a_film_of_another_run_stays(here, capsys):
+    Path("videos").mkdir()
+    for name, film in (("a/run", "run"), ("b/run", "run-2"), ("c/run", "run-3")):
+        assert f"video  videos/{film}.mp4" in call([*FILM, name], capsys)[1]
+        assert json.loads(Path(name, "summary.json").read_text())["video"] == f"videos/{film}.mp4"
+    before = {path: path.read_bytes() for path in Path("videos").iterdir()}
+    out = call([*FILM, "b/run", "--overwrite", "--alpha", "0.7"], capsys)[1]
+    assert "video  videos/run-2.mp4" in out
+    after = {path: path.read_bytes() for path in Path("videos").iterdir()}
+    changed = [path.name for path in before if before[path] != after[path]]
+    assert (changed, before.keys()) == (["run-2.mp4"], after.keys())
+
+
+@pytest.mark.parametrize("film", ["thesis.mp4", "videos/other.mp4", "../videos/run.mp4"])
+def test_only_a_film_of_its_own_goes_with_a_run(film, here, capsys):
+    (here / "work/videos").mkdir(parents=True)
+    os.chdir("work")
+    assert call([*NINE, "--run-dir", "run"], capsys)[0] == 0
+    Path(film).parent.mkdir(exist_ok=True)
+    Path(film).write_text("years of work")
+    summary = json.loads(Path("run/summary.json").read_text())
+    Path("run/summary.json").write_text(json.dumps({**summary, "video": film}))
+    assert call([*NINE, "--run-dir", "run", "--overwrite"], capsys)[0] == 0
+    assert Path(film).read_text() == "years of work"
+
+
+def test_a_film_that_a_kill_cut_short_keeps_its_name(here, fork, capsys):
+    Path("videos").mkdir()
+    Path("videos/run.mp4").write_text("another's")
+    child = fork([*FILM, "run"], prepare=_dies_when_it_has_filmed)
+    assert child.wait() == -signal.SIGKILL
+    assert call(["train", "--resume", "run"], capsys)[0] == 0
+    assert names("videos") == ["run-2.mp4", "run.mp4"]
+    assert call([*FILM, "other/run", "--no-video"], capsys)[0] == 0
+    summaries = [
+        json.loads(Path(name, "summary.json").read_text()) for name in ("run", "other/run")
+    ]
+    assert list(summaries[0].items()) == [*summaries[1].items(), ("video", "videos/run-2.mp4")]
+
+
+def _dies_when_it_has_filmed():
+    runs.finish_run = lambda folder: os.kill(os.getpid(), signal.SIGKILL)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="needs a terminal that a program can read")
+def test_a_terminal_is_told_of_compiling_and_of_the_speed_without_it(here):
+    import pty
+
+    reader, writer = pty.openpty()
+    cache = {"NUMBA_CACHE_DIR": str(here / "cache"), "TERM": "xterm", "COLUMNS": "120"}
+    command = [sys.executable, "-m", "mjcartpole", *FILM, "run", "--no-video"]
+    process = subprocess.Popen(
+        command, stdout=subprocess.DEVNULL, stderr=writer, env={**os.environ, **cache}
+    )
+    shown = b""
+    while process.poll() is None or select.select([reader], [], [], 0.5)[0]:
+        if select.select([reader], [], [], 0.1)[0]:
+            shown += os.read(reader, 4096)
+    os.close(writer)
+    os.close(reader)
+    assert b"compiling \x1b" in shown
+    # Nine episodes take less than a millisecond, and to compile takes seconds.
+    assert re.search(rb"[\d,]+ steps in 0\.0 s \([\d,]+ per second\)\r\n$", shown)
+    assert json.loads(Path("run/timing.json").read_text())["training_seconds"] < 0.5
+
+
+def test_a_training_that_is_refused_leaves_nothing(here, capsys):
+    assert call([*NINE, "--run-dir", "run"], capsys)[0] == 0
+    code, out, err = call([*FILM, "run"], capsys)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert names(".") == ["run"]
+    os.chdir("run")
+    assert call(["train", "--resume", "."], capsys)[1] == ". is complete: nothing is left to do\n"
 
 
 def test_an_unwritable_videos_folder_is_noticed_before_training(here, capsys):

@@ -150,6 +150,26 @@ def test_mistakes_in_the_sources(tmp_path, policies):
         run_transfer(policies[:1], models=["cartpole"], output=tmp_path / "taken")
 
 
+def test_a_table_is_never_replaced_unasked(policies, tmp_path, capsys):
+    for _ in range(2):
+        run_transfer(policies[:1], models=["gym"], episodes=2)
+        run_transfer(policies[:1], swept="gravity=9:10:1", episodes=2)
+    out = capsys.readouterr().out
+    names = ["sweep-gravity", "sweep-gravity-2", "transfer", "transfer-2"]
+    assert sorted({path.stem for path in (tmp_path / "transfer").iterdir()}) == names
+    for name in names:
+        assert f"written transfer/{name}.csv, .json and .png" in out
+    mine = tmp_path / "mine"
+    run_transfer(policies[:1], models=["gym"], episodes=2, output=mine)
+    (mine / "transfer.csv").unlink()
+    before = {path: path.read_bytes() for path in mine.iterdir()}
+    with pytest.raises(FileError, match=r"transfer\.json' exists.*--overwrite"):
+        run_transfer(policies[:1], models=["gym"], episodes=3, output=mine)
+    assert {path: path.read_bytes() for path in mine.iterdir()} == before
+    run_transfer(policies[:1], models=["gym"], episodes=3, output=mine, overwrite=True)
+    assert (mine / "transfer.csv").is_file()
+
+
 def test_no_plotting_library_is_needed(policies, tmp_path):
     code = (
         "import sys; from pathlib import Path; from mjcartpole.transfer_command import *; "

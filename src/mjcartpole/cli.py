@@ -1,7 +1,8 @@
 """The command line: parse, call, print.
 
-Results go to stdout, progress and errors to stderr. Exit codes: 0, 2 for a user's mistake, 130
-after Ctrl-C. Heavy modules are imported by the command that needs them, so `--help` is quick.
+Results go to stdout, progress and errors to stderr. Exit codes: 0, 2 for a user's mistake or for
+results that could not be printed, 130 after Ctrl-C. Heavy modules are imported by the command that
+needs them, so `--help` is quick.
 """
 
 import contextlib
@@ -10,6 +11,7 @@ import io
 import json
 import logging
 import os
+import re
 import sys
 from collections.abc import Callable, Sequence
 from typing import Annotated, Any, NoReturn
@@ -31,9 +33,14 @@ from mjcartpole.flags import (
     Watch,
 )
 from mjcartpole.learning.config import TrainConfig
+from mjcartpole.output import has_left, patient_output, stdout_problem
 from mjcartpole.signals import Interrupted, StopSignals
 
+FAILED = 2
 INTERRUPTED = 130
+_DASHED_FILE = re.compile(r"-(?!-|o=).+\.(mp4|gif|webp|png|xml|json)")
+"""A file whose name begins with a dash: no flag with a single one looks like this."""
+_LISTS = ("--bins", "--low", "--high", "--rungs", "--models")
 COMMANDS = ("train", "evaluate", "render", "parity", "doctor", "model", "transfer", "watch")
 
 
@@ -43,19 +50,31 @@ class UsageError(MjCartPoleError):
 
 def main(argv: Sequence[str] | None = None) -> NoReturn:
     """Run a command and exit with its code."""
-    try:
-        code = _run(list(sys.argv[1:] if argv is None else argv))
-    except MjCartPoleError as error:
-        print(f"mjcartpole: error: {error}", file=sys.stderr)
-        code = 2
-    except KeyboardInterrupt as interrupt:
-        print(f"mjcartpole: {str(interrupt) or 'interrupted'}", file=sys.stderr)
-        code = getattr(interrupt, "exit_code", INTERRUPTED)
-    except BrokenPipeError:
-        # The reader of stdout has gone (`mjcartpole … | head`): nothing is left to say.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        code = 0
+    with patient_output():
+        code = _exit_code(list(sys.argv[1:] if argv is None else argv))
+        problem = stdout_problem()
+        if problem is not None and not has_left(problem):
+            reason = problem.strerror or problem
+            _complain(f"error: stdout could not be written ({reason}); all else went on without it")
+            code = code or FAILED
     sys.exit(code)
+
+
+def _exit_code(argv: list[str]) -> int:
+    try:
+        return _run(argv)
+    except SystemExit as stop:  # After --help.
+        return int(stop.code or 0)
+    except MjCartPoleError as error:
+        _complain(f"error: {error}")
+        return FAILED
+    except KeyboardInterrupt as interrupt:
+        _complain(str(interrupt) or "interrupted")
+        return int(getattr(interrupt, "exit_code", INTERRUPTED))
+
+
+def _complain(message: str) -> None:
+    print(f"mjcartpole: {message}", file=sys.stderr)
 
 
 def _run(argv: list[str]) -> int:
@@ -112,6 +131,7 @@ def _parity(command: Parity) -> int:
         against=command.against,
         rungs=command.rungs,
         quick=command.quick,
+        strict=command.strict,
         output=command.json,
     )
 
@@ -150,6 +170,7 @@ def _transfer(command: Transfer) -> int:
         seed=command.seed,
         workers=command.workers,
         output=command.output,
+        overwrite=command.overwrite,
     )
 
 
@@ -213,6 +234,7 @@ def _render(command: Render) -> int:
         episodes=command.episodes,
         output=command.output,
         sheet=command.sheet,
+        overwrite=command.overwrite,
     )
 
 
@@ -243,7 +265,7 @@ class _ToStderr(logging.Handler):
     """One line per record on what is stderr at that time: a progress bar may have taken it over."""
 
     def emit(self, record: logging.LogRecord) -> None:
-        print(f"mjcartpole: {record.getMessage()}", file=sys.stderr)
+        _complain(record.getMessage())
 
 
 def _report_to_stderr() -> None:
@@ -267,7 +289,8 @@ def parse(argv: Sequence[str]) -> Command:
         UsageError: A word of it is not understood.
         SystemExit: With code 0, after `--help`.
     """
-    argv = _gather_edits(argv)
+    argv = [f"./{word}" if _DASHED_FILE.fullmatch(word) else word for word in argv]
+    argv = _split_lists(_gather_edits(argv))
     preset = _preset_in(argv)
     train_default = Train(config=TrainConfig.preset(preset), preset=preset)
     grammar = (
@@ -287,7 +310,8 @@ def parse(argv: Sequence[str]) -> Command:
                 grammar,
                 args=list(argv),
                 prog="mjcartpole",
-                description="CartPole-v1 as real physics: train a Q-table, evaluate it, film it.",
+                description="CartPole-v1 as real physics: train a Q-table, evaluate it, film it. "
+                "mjcartpole --version prints the version.",
             )
     except SystemExit as stop:
         if not stop.code:
@@ -304,16 +328,41 @@ def _gather_edits(argv: Sequence[str]) -> list[str]:
     words, edits, follows, first = [], list[str](), False, False
     for word in argv:
         if word == "--set" or word.startswith("--set="):
-            edits += [word.removeprefix("--set=")] if "=" in word else []
+            edits += _split_edits(word.removeprefix("--set=")) if "=" in word else []
             follows, first = True, "=" not in word
         elif follows and (first or "=" in word) and not word.startswith("-"):
             # The first one is meant as an edit, even where it is none.
-            edits.append(word)
+            edits += _split_edits(word)
             first = False
         else:
             follows = False
             words.append(word)
     return [*words, "--set", *edits] if edits else words
+
+
+def _split_edits(word: str) -> list[str]:
+    """The edits of a word, which may have commas between them: a.b=1,c.d=2."""
+    return re.split(r",(?=[\w.:]+=)", word)
+
+
+def _split_lists(argv: Sequence[str]) -> list[str]:
+    """Take the values of a flag that has several with commas too: 1,3,6,8 as 1 3 6 8."""
+    words, follows = list[str](), False
+    for word in argv:
+        flag, _, value = word.partition("=")
+        if flag in _LISTS:
+            follows = True
+            words += [flag, *_split_values(value)]
+        else:
+            follows = follows and not re.match(r"--|-[A-Za-z]$", word)
+            words += _split_values(word) if follows else [word]
+    return words
+
+
+def _split_values(word: str) -> list[str]:
+    if os.path.exists(word):  # noqa: PTH110 - a Path raises where a name is too long
+        return [word]
+    return [value for value in re.split(r"[,\s]+", word) if value]
 
 
 def _preset_in(argv: Sequence[str]) -> str:

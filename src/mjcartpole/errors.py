@@ -2,6 +2,8 @@
 
     MjCartPoleError
     ├── ConfigError            a setting that makes no sense (also a ValueError)
+    │   └── SettingError           an attribute that an env lacks, or that cannot be set (also an
+    │                              AttributeError)
     ├── ModelError             an MJCF that cannot be used (also a ValueError)
     │   ├── ModelNotFoundError     no such name or file
     │   ├── ModelSyntaxError       MuJoCo does not accept the document
@@ -26,6 +28,10 @@ class MjCartPoleError(Exception):
 
 class ConfigError(MjCartPoleError, ValueError):
     """A setting makes no sense."""
+
+
+class SettingError(ConfigError, AttributeError):
+    """An attribute that an environment lacks, or that cannot be read or set."""
 
 
 class ModelError(MjCartPoleError, ValueError):

@@ -1,16 +1,17 @@
 """Files that are written whole or not at all."""
 
 import contextlib
+import functools
 import os
 import re
-import secrets
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from mjcartpole.errors import FileError
+from mjcartpole.leftovers import temporary_beside
 
 _TEMPORARY = re.compile(r"\.[\w.-]+-[0-9a-f]{8}(\.\w+)?")
-"""What `_make_temporary` calls them."""
+"""What `temporary_beside` calls them."""
 
 
 @contextlib.contextmanager
@@ -18,22 +19,18 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
     """Yield a temporary path beside `path`; on success it takes the place of `path` at once.
 
     If the body raises, or the process is killed, the old file (if any) stays as it was.
-    The temporary name keeps the suffix, since encoders choose the format by it.
+    The temporary name keeps the suffix, since encoders choose the format by it. What writers that
+    were killed have left in that folder goes.
 
     Raises:
         FileError: The folder cannot be written, or the disk is full.
     """
     target = Path(path)
-    temporary = _make_temporary(target)
-    try:
+    with _temporary(target) as temporary:
         yield temporary
         sync(temporary)
         temporary.replace(target)
         sync(target.parent)
-    except OSError as error:
-        raise FileError(f"cannot write '{target}': {_reason(error)}") from error
-    finally:
-        temporary.unlink(missing_ok=True)
 
 
 def write_whole(path: str | os.PathLike[str], text: str) -> None:
@@ -43,7 +40,8 @@ def write_whole(path: str | os.PathLike[str], text: str) -> None:
         FileError: The folder cannot be written, or the disk is full.
     """
     with replacing(path) as temporary:
-        temporary.write_bytes(text.encode("utf-8"))
+        # A file name in it that is no text is escaped, as JSON does it.
+        temporary.write_bytes(text.encode("utf-8", "backslashreplace"))
 
 
 def make_folder(path: str | os.PathLike[str]) -> Path:
@@ -66,7 +64,33 @@ def check_writable(folder: Path) -> None:
     Raises:
         FileError: See above.
     """
-    _make_temporary(folder / "probe").unlink()
+    with _temporary(folder / "probe"):
+        pass
+
+
+def check_free(paths: Sequence[Path]) -> None:
+    """Refuse to replace what is there already; an empty folder is nothing.
+
+    Raises:
+        FileError: One of them is there.
+    """
+    for path in paths:
+        if os.path.lexists(path) and not (path.is_dir() and not any(path.iterdir())):
+            raise FileError(f"'{path}' exists; choose another -o, or replace it with --overwrite")
+
+
+def free_path(path: Path, suffixes: Sequence[str] = ()) -> Path:
+    """The first of `a.mp4`, `a-2.mp4`, `a-3.mp4` … that is not there.
+
+    Args:
+        path: The first.
+        suffixes: What belongs to it: none of these is there beside it either.
+    """
+    stem, free, number = path.with_suffix(""), path, 1
+    while any(os.path.lexists(free.with_suffix(suffix)) for suffix in (path.suffix, *suffixes)):
+        number += 1
+        free = stem.with_name(f"{stem.name}-{number}{path.suffix}")
+    return free
 
 
 def remove_leftovers(folder: Path) -> None:
@@ -81,16 +105,19 @@ def is_temporary(name: str) -> bool:
     return _TEMPORARY.fullmatch(name) is not None
 
 
-def _make_temporary(target: Path) -> Path:
+@contextlib.contextmanager
+def _temporary(target: Path) -> Iterator[Path]:
     make_folder(target.parent)
     if target.is_dir():
         raise FileError(f"cannot write '{target}': it is a folder; give the path of a file")
-    temporary = target.with_name(f".{target.stem}-{secrets.token_hex(4)}{target.suffix}")
     try:
-        temporary.touch(exist_ok=False)
+        with temporary_beside(target, functools.partial(Path.touch, exist_ok=False)) as temporary:
+            try:
+                yield temporary
+            finally:
+                temporary.unlink(missing_ok=True)
     except OSError as error:
         raise FileError(f"cannot write '{target}': {_reason(error)}") from error
-    return temporary
 
 
 def sync(path: Path) -> None:

@@ -27,11 +27,11 @@ class Train:
     preset: str = "tuned"
     """Where the defaults below come from: tuned, article, article-terminal or two-poles."""
     run_dir: Path | None = None
-    """Folder for the run; runs/<preset>-<backend>-seed<seed> if left out."""
+    """Folder for the run; runs/<preset>-<backend>-<what was changed>-seed<seed> if left out."""
     video: bool = True
     """Film the first evaluation episode into videos/<run's name>.mp4."""
     overwrite: bool = False
-    """Replace the run that --run-dir holds."""
+    """Replace the run that is there; without --run-dir, instead of adding a number to its name."""
     resume: Path | None = None
     """Continue the training of this run folder, or from a checkpoint in it, as it began."""
     engine: Engine = "compiled"
@@ -71,7 +71,7 @@ class Evaluate(Played):
     source: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="RUN-OR-POLICY")] = (
         tyro.MISSING
     )
-    """A run folder or a policy file."""
+    """A run folder, one of many --seeds, or a policy file."""
     episodes: int = EPISODES
     """How many."""
     json: bool = False
@@ -85,9 +85,13 @@ class Render(Played):
     sources: Annotated[
         tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="RUN-OR-POLICY …")
     ] = tyro.MISSING
-    """Run folders or policy files; several are shown side by side, from the same start."""
+    """Run folders or policy files; several are shown side by side, from the same start. Of many
+    --seeds in one folder, the median seed is shown."""
     output: Annotated[Path | None, tyro.conf.arg(aliases=["-o"])] = None
-    """An .mp4, .gif or .webp, or a folder for pictures; videos/<name>.mp4 if left out."""
+    """An .mp4, .gif or .webp, or a folder for pictures; videos/<name>.mp4 if left out, with a
+    number where that is there already."""
+    overwrite: bool = False
+    """Replace what is there."""
     episodes: int = 1
     """How many, one after the other."""
     camera: str = "side"
@@ -122,6 +126,8 @@ class Parity:
     """Which rungs of the ladder."""
     quick: bool = False
     """Fewer samples."""
+    strict: bool = False
+    """Exit with 1 also where the motion holds and the model's numbers are not CartPole-v1's."""
     json: Path | None = None
     """Write every figure to this file."""
 
@@ -157,7 +163,7 @@ class Transfer:
     sources: Annotated[
         tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="RUN-OR-POLICY …")
     ] = tyro.MISSING
-    """Run folders or policy files."""
+    """Run folders or policy files; many --seeds in one folder count as one."""
     models: tuple[str, ...] = ()
     """Names or files of models, and gym for gymnasium's own; all there are if left out."""
     set: tuple[str, ...] = ()
@@ -174,8 +180,11 @@ class Transfer:
     """Seeds the starting states."""
     workers: int | None = None
     """How many evaluations at once; as many as there are cores if left out."""
-    output: Annotated[Path, tyro.conf.arg(aliases=["-o"])] = Path("transfer")
-    """Folder for the table, the JSON and the picture."""
+    output: Annotated[Path | None, tyro.conf.arg(aliases=["-o"])] = None
+    """Folder for the table, the JSON and the picture; in transfer/, they get a number where such
+    are there already."""
+    overwrite: bool = False
+    """Replace what is there."""
 
 
 @dataclass(frozen=True)

@@ -6,9 +6,11 @@ from pathlib import Path
 
 from mjcartpole.errors import ConfigError
 from mjcartpole.files import write_whole
+from mjcartpole.physics.beyond import differs_from, idle_numbers
 from mjcartpole.physics.describe import describe
-from mjcartpole.physics.edit import EDIT_NAMES, describe_edits, differs_from
+from mjcartpole.physics.edit import EDIT_NAMES, describe_edits
 from mjcartpole.physics.model import find_model, load_model, model_names, models_folder
+from mjcartpole.physics.playable import why_unplayable
 from mjcartpole.physics.simulation import silence_mujoco
 
 _COMMENT = re.compile(r"<!--(.*?)-->", re.DOTALL)
@@ -38,9 +40,17 @@ def run_show(name: str, edits: Sequence[str], own_timestep: bool = False) -> int
     for line in describe(cartpole).text():
         print(f"  {line}")
     different = differs_from(cartpole)
+    idle = [] if cartpole.poles > 1 else idle_numbers(cartpole)
     print("\ndiffers from CartPole-v1:" if different else "\nmoves as CartPole-v1 does")
     for phrase in different:
         print(f"  {phrase}")
+    if idle:
+        print("what no episode feels:")
+    for phrase in idle:
+        print(f"  {phrase}")
+    why = why_unplayable(cartpole)
+    if why:
+        print(f"\n{why}")
     return 0
 
 

@@ -19,6 +19,10 @@ QUESTIONS: dict[Against, str] = {
     "cartpole-v1": "Is {} CartPole-v1?",
     "itself": "Does MuJoCo move {} as the equations with its own parameters do?",
 }
+MOVES: dict[Against, str] = {
+    "cartpole-v1": "CartPole-v1",
+    "itself": "its own equations say",
+}
 VERDICTS = {"holds": "holds", "fails": "FAILS", "beyond": "BEYOND", "skipped": "skipped"}
 
 
@@ -29,18 +33,27 @@ def run_parity(
     against: Against,
     rungs: Sequence[int],
     quick: bool,
+    strict: bool = False,
     output: Path | None,
 ) -> int:
-    """Climb the ladder and print each rung as it is found. Returns the exit code."""
+    """Climb the ladder and print each rung as it is found.
+
+    Returns:
+        0 where the motion holds (with `strict`, where no number differs either), else 1.
+    """
     silence_mujoco()
     check_rungs(rungs)
     cartpole = load_model(model, edits, own_timestep=True)
     subject = Subject(cartpole, against, quick)
     # A model whose parameters cannot be read is the user's mistake: better known before any work.
-    _ = subject.causes
+    _ = subject.numbers
     if output:
         check_writable(make_folder(output.parent))
     print(QUESTIONS[against].format(cartpole.name) + (" (quick)" if quick else ""))
+    if subject.region.bounds:
+        print(f"  asked where it moves freely; outside: {'; '.join(subject.region.bounds)}")
+    if subject.solves_to_the_end:
+        print("  dry friction is solved to the end, not to the file's solver tolerance")
     results: list[Result] = []
     console, ladder = Console(stderr=True), run_ladder(subject, rungs)
     # While it is shown, the status takes stdout over: nothing may be printed then.
@@ -48,13 +61,14 @@ def run_parity(
         results.append(result)
         _print_result(result)
     holds = all(result.verdict in {"holds", "skipped"} for result in results)
-    _print_answer(subject, results, holds)
+    _print_motion(subject, results, holds)
+    _print_numbers(subject, holds)
     if output:
         write_whole(
             output, json.dumps(_report(subject, results, holds), indent=2, allow_nan=False) + "\n"
         )
         print(f"\nreport {output}")
-    return 0 if holds else 1
+    return 0 if holds and not (strict and subject.numbers) else 1
 
 
 def _next_result(console: Console, ladder: Iterator[Result]) -> Result | None:
@@ -88,17 +102,32 @@ def _bound(figure: Figure) -> str:
     return f"{relation} {_number(figure.bound)} {figure.unit}".rstrip() + mark
 
 
-def _print_answer(subject: Subject, results: list[Result], holds: bool) -> None:
-    name = subject.cartpole.name
+def _print_motion(subject: Subject, results: list[Result], holds: bool) -> None:
     failed = [str(r.rung) for r in results if r.verdict in {"fails", "beyond"}]
     skipped = [str(r.rung) for r in results if r.verdict == "skipped"]
     ending = f"; skipped: {', '.join(skipped)}" if skipped else ""
+    name = subject.cartpole.name
     if holds:
-        print(f"\n{name}: all rungs hold ({len(results) - len(skipped)}){ending}")
+        verdict = f"all rungs hold ({len(results) - len(skipped)}){ending}"
+        moves = f": it moves as {MOVES[subject.against]}" if len(skipped) < len(results) else ""
+        print(f"\nmotion   {name}: {verdict}{moves}")
         return
-    print(f"\n{name}: does not hold on rung {', '.join(failed)}{ending}")
-    for cause in subject.causes:
+    print(f"\nmotion   {name}: does not hold on rung {', '.join(failed)}{ending}")
+    for cause in subject.beyond if subject.against == "itself" else ():
         print(f"  {cause}")
+
+
+def _print_numbers(subject: Subject, holds: bool) -> None:
+    """Whether the document's numbers are CartPole-v1's, whatever the motion."""
+    if subject.against == "itself":
+        print("numbers  its own, as the compiled model has them")
+    elif not subject.numbers:
+        print("numbers  CartPole-v1's own")
+    else:
+        moves = "moves as CartPole-v1, with other numbers" if holds else "other numbers"
+        print(f"numbers  {moves}:")
+        for phrase in subject.numbers:
+            print(f"  {phrase}")
 
 
 def _report(subject: Subject, results: list[Result], holds: bool) -> dict[str, Any]:
@@ -108,6 +137,8 @@ def _report(subject: Subject, results: list[Result], holds: bool) -> dict[str, A
         "quick": subject.quick,
         "holds": holds,
         "causes": subject.causes,
+        "numbers": subject.numbers,
+        "outside": subject.region.bounds,
         "parameters": dataclasses.asdict(subject.own),
         "reference": dataclasses.asdict(subject.reference),
         "versions": versions(),

@@ -1,23 +1,35 @@
 """What `render` does and prints."""
 
 import contextlib
-from collections.abc import Generator, Sequence
+import re
+from collections.abc import Generator, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from PIL import Image
 from rich.console import Console
 from rich.progress import Progress
 
-from mjcartpole.commands import VIDEOS, Choice, set_stage
-from mjcartpole.errors import FileError, RenderError
-from mjcartpole.files import check_writable, replacing
+from mjcartpole.commands import VIDEOS, Choice, counted, median_seed, set_stage
+from mjcartpole.errors import FileError, RenderError, RunError
+from mjcartpole.files import check_free, check_writable, free_path, replacing
+from mjcartpole.learning import runs
+from mjcartpole.learning.naming import shortened
+from mjcartpole.learning.training import TrainResult
+from mjcartpole.media.encoders import find_ffmpeg
 from mjcartpole.media.video import check_path, write_video
+from mjcartpole.physics.model import CartPole
 from mjcartpole.signals import Interrupted, StopSignals
+from mjcartpole.studies import seed_runs
 from mjcartpole.studies.evaluation import check_count
 from mjcartpole.studies.film import Film, Frame, Look, Stage, Take, play
 
 SHEET_FRAMES = 10
 """Pictures on a contact sheet."""
+_INSTEAD = {".mp4": (".gif",)}
+"""What may be written in an mp4's place (see `write_video`)."""
+MOST_NAME = 216
+"""Bytes of a video's name; that of a file may have 255."""
 MOST_NAMES = 3
 """Runs that a video's file is named after; of more, the first one stands for all."""
 
@@ -30,21 +42,49 @@ def run_render(
     episodes: int,
     output: Path | None,
     sheet: bool,
+    overwrite: bool = False,
 ) -> int:
-    """Film greedy episodes of one run, or of several side by side. Returns the exit code."""
+    """Film greedy episodes of one run, or of several side by side. Returns the exit code.
+
+    Args:
+        sources: Run folders or policy files.
+        choice: Where they are played.
+        look: How it looks.
+        episodes: How many of each.
+        output: The file or folder; None: a name in videos/ that is not there yet.
+        sheet: Draw a contact sheet instead.
+        overwrite: Replace what is there.
+
+    Raises:
+        MjCartPoleError: Something cannot be used; nothing has been played then.
+    """
     signals = StopSignals()
     with signals.caught():
-        stages = [set_stage(source, choice) for source in sources]
-        path = output or VIDEOS / f"{_name(stages)}{'.png' if sheet else '.mp4'}"
+        stages = [set_stage(_shown(source), choice) for source in sources]
+        path = output or _default_path(stages, ".png" if sheet else ".mp4", overwrite)
         for stage in stages:
             look.check(stage.cartpole)
             check_count(episodes, stage.seed)
         if sheet:
             _check_sheet(stages, episodes, path)
-        _check_output(path, ".png" if sheet else check_path(path))
+        _check_output(path, ".png" if sheet else check_path(path), overwrite)
         casts = [play(stage, episodes) for stage in stages]
         (_write_sheet if sheet else film)(casts, look, path, signals)
     return 0
+
+
+def _shown(source: Path) -> Path:
+    """What is filmed of a source: of many seeds, the one in the middle, which is told."""
+    if not seed_runs.is_seeds(source):
+        return source
+    folder, count = median_seed(source)
+    print(f"{folder}  (the median of {counted(count, 'seed')} by mean greedy return)", flush=True)
+    return folder
+
+
+def _default_path(stages: Sequence[Stage], suffix: str, overwrite: bool) -> Path:
+    path = VIDEOS / f"{_name(stages)}{suffix}"
+    return path if overwrite else free_path(path, _INSTEAD.get(suffix, ()))
 
 
 def _name(stages: Sequence[Stage]) -> str:
@@ -52,13 +92,65 @@ def _name(stages: Sequence[Stage]) -> str:
     names = [stage.name for stage in stages]
     if len(names) > MOST_NAMES:
         names[1:] = [f"{len(names) - 1}-others"]
-    return "-beside-".join(names)
+    return "-beside-".join(shortened(name, MOST_NAME // len(names)) for name in names)
+
+
+def film_result(
+    result: TrainResult,
+    cartpole: CartPole,
+    folder: Path,
+    summary: dict[str, Any],
+    signals: StopSignals,
+) -> None:
+    """Film the first evaluation episode of a run into videos/, and name it in the summary.
+
+    Args:
+        result: What was learned.
+        cartpole: The model that it was learned on.
+        folder: The run folder.
+        summary: Its summary; one that names a film was written before a kill.
+        signals: See `film`.
+
+    Raises:
+        Interrupted: See `film`.
+    """
+    config, name = result.config, folder.resolve().name
+    stage = Stage(
+        name=name,
+        policy=result.policy,
+        backend=config.backend,
+        model=cartpole if config.backend == "mujoco" else "cartpole",
+        integrator=config.integrator,
+    )
+    path = _own_film(folder, summary) or _default_path([stage], ".mp4", overwrite=False)
+    # Named before it is drawn: resumed after a kill, the training takes no second name.
+    summary["video"] = str(path)
+    runs.write_summary(folder, summary)
+    written = film([play(stage)], Look(), path, signals)
+    if written != path:
+        summary["video"] = str(written)
+        runs.write_summary(folder, summary)
+
+
+def remove_film(folder: Path) -> None:
+    """Remove the film of a run that is about to be replaced, if it is where training puts it."""
+    with contextlib.suppress(RunError):
+        path = _own_film(folder, runs.read_summary(folder))
+        if path is not None:
+            path.unlink(missing_ok=True)
+
+
+def _own_film(folder: Path, summary: Mapping[str, Any]) -> Path | None:
+    """The film that a run's summary names, if a training of that folder may have written it."""
+    film, name = Path(str(summary.get("video", ""))), shortened(folder.resolve().name, MOST_NAME)
+    own = re.fullmatch(re.escape(name) + r"(-\d+)?\.(mp4|gif)", film.name)
+    return film if own and film.parent == VIDEOS else None
 
 
 def film(
     casts: Sequence[Sequence[Take]], look: Look, path: Path, signals: StopSignals | None = None
-) -> None:
-    """Draw takes and write them as a video; print what came out.
+) -> Path:
+    """Draw takes and write them as a video; print what came out, and return where it is.
 
     Args:
         casts: See `Film`.
@@ -80,6 +172,7 @@ def film(
             f"video  {video.path}  ({_what_happened(casts)}; {seconds:.1f} s, "
             f"{video.width}x{video.height}, drawn by {drawn.drawn_by})"
         )
+    return video.path
 
 
 def _with_progress(drawn: Film, signals: StopSignals) -> Generator[Frame]:
@@ -98,15 +191,18 @@ def _raise_noted(signals: StopSignals) -> None:
 def _what_happened(casts: Sequence[Sequence[Take]]) -> str:
     takes = [take for takes in casts for take in takes]
     if len(takes) == 1:
-        return f"{takes[0].episode.steps} steps, {takes[0].episode.ending}"
+        return f"{counted(takes[0].episode.steps, 'step')}, {takes[0].episode.ending}"
     steps = [take.episode.steps for take in takes]
     return f"{len(takes)} episodes of {min(steps)} to {max(steps)} steps"
 
 
-def _check_output(path: Path, suffix: str) -> None:
-    """Refuse a place where nothing can be written, before anything is played."""
+def _check_output(path: Path, suffix: str, overwrite: bool) -> None:
+    """Refuse a place that is taken or where nothing can be written, before anything is played."""
     if suffix and path.is_dir():
         raise FileError(f"cannot write '{path}': it is a folder; give the path of a file")
+    instead = [path.with_suffix(other) for other in _INSTEAD.get(suffix, ()) if not find_ffmpeg()]
+    if not overwrite:
+        check_free([path, *instead])
     check_writable(path.parent)
 
 

@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM, so that what was learned is kept."""
+"""Ctrl-C, SIGTERM and a terminal that is closed, so that what was learned is kept."""
 
 import contextlib
 import signal
@@ -6,7 +6,11 @@ import threading
 from collections.abc import Iterator
 from types import FrameType
 
-EXIT_CODES = {signal.SIGINT: 130, signal.SIGTERM: 143}
+EXIT_CODES = {
+    getattr(signal, name): 128 + getattr(signal, name)
+    for name in ("SIGINT", "SIGTERM", "SIGHUP")
+    if hasattr(signal, name)  # Windows knows no SIGHUP.
+}
 
 
 class Interrupted(KeyboardInterrupt):
@@ -36,11 +40,19 @@ class StopSignals:
 
     @contextlib.contextmanager
     def caught(self) -> Iterator[None]:
-        """Catch both signals inside; they raise `Interrupted`."""
+        """Catch these signals inside; they raise `Interrupted`.
+
+        One that is ignored stays so, as `nohup` wants it. Only Ctrl-C's is caught all the same:
+        shells have their background jobs ignore it, and `kill -INT` shall reach those.
+        """
         if threading.current_thread() is not threading.main_thread():
             yield  # Only the main thread may; it decides for the others.
             return
-        before = {number: signal.signal(number, self._handle) for number in EXIT_CODES}
+        before = {
+            number: signal.signal(number, self._handle)
+            for number in EXIT_CODES
+            if number == signal.SIGINT or signal.getsignal(number) is not signal.SIG_IGN
+        }
         try:
             yield
         finally:

@@ -5,11 +5,13 @@ Only the rules: no physics engine, no gymnasium. The numbers are those of gymnas
 """
 
 import math
-from collections.abc import Sequence
-from typing import Final
+from collections.abc import Mapping, Sequence
+from typing import Any, Final, SupportsFloat
 
 import numpy as np
 import numpy.typing as npt
+
+from mjcartpole.errors import ConfigError
 
 CONTROL_STEP: Final = 0.02
 """Seconds between two actions."""
@@ -34,6 +36,46 @@ N_ACTIONS: Final = 2
 """0 pushes to the left (-x), 1 to the right (+x)."""
 
 
+def start_bounds(options: Mapping[str, Any] | None, *others: str) -> tuple[float, float]:
+    """Bounds of the starting state's values, as `reset(options=...)` gives them.
+
+    >>> start_bounds({"low": -0.01})
+    (-0.01, 0.05)
+
+    Args:
+        options: What `reset` was given.
+        others: Options beside "low" and "high" that are read elsewhere.
+
+    Raises:
+        ConfigError: An option is unknown, a bound is no finite number, or low is above high.
+    """
+    known = ("low", "high", *others)
+    if not isinstance(options, Mapping | None):
+        raise ConfigError(f"options of reset are a dict, not {options!r}")
+    for name in options or {}:
+        if name not in known:
+            raise ConfigError(
+                f"reset has no option {name!r}; available: {', '.join(known)}. What belongs to the "
+                "model or the rules is given where the environment is made"
+            )
+    given = {"low": RESET_LOW, "high": RESET_HIGH, **(options or {})}
+    low, high = (_finite(name, given[name]) for name in ("low", "high"))
+    if low > high:
+        raise ConfigError(f"low ({low}) is above high ({high}); the starting state lies between")
+    _finite("the distance from low to high", high - low)
+    return low, high
+
+
+def _finite(name: str, value: SupportsFloat | str) -> float:
+    try:
+        number = float(value)
+    except (TypeError, ValueError, OverflowError):
+        number = math.nan
+    if not math.isfinite(number):
+        raise ConfigError(f"{name} is a finite number, not {value!r}")
+    return number
+
+
 def frame_rate(control_step: float = CONTROL_STEP) -> int:
     """Frames per second of a film with one frame per control step of so many seconds."""
     return max(1, round(1 / control_step))
@@ -55,14 +97,16 @@ def in_words(poles: int) -> str:
     return "1 pole" if poles == 1 else f"{poles} poles"
 
 
-def observation_bound(poles: int = 1) -> npt.NDArray[np.float32]:
+def observation_bound(
+    poles: int = 1, x_limit: float = X_LIMIT, theta_limit: float = THETA_LIMIT
+) -> npt.NDArray[np.float32]:
     """Upper bound of the observation, shape (2 + 2 poles,); the lower bound is its negative.
 
     Positions may be twice as large as the limits that end an episode, so that the observation of
     the last step still lies inside; velocities are unbounded.
     """
-    angle = [THETA_LIMIT * 2, np.inf]
-    return np.array([X_LIMIT * 2, np.inf, *angle * poles], dtype=np.float32)
+    angle = [theta_limit * 2, np.inf]
+    return np.array([x_limit * 2, np.inf, *angle * poles], dtype=np.float32)
 
 
 def has_terminated(x: float, theta: float) -> bool:

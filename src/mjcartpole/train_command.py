@@ -1,10 +1,10 @@
 """What `train` does and prints."""
 
 import dataclasses
+import shlex
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from rich.console import Console
 from rich.progress import (
@@ -12,29 +12,31 @@ from rich.progress import (
     MofNCompleteColumn,
     Progress,
     ProgressColumn,
+    Task,
     TextColumn,
     TimeRemainingColumn,
 )
+from rich.text import Text
 
-from mjcartpole.commands import RUNS, VIDEOS, print_evaluation
+from mjcartpole.commands import RUNS, VIDEOS, counted, print_evaluation, print_seeds
 from mjcartpole.errors import ConfigError
 from mjcartpole.files import check_writable, make_folder
 from mjcartpole.learning import runs, tensorboard
 from mjcartpole.learning.checkpoints import LATEST
 from mjcartpole.learning.config import TrainConfig
-from mjcartpole.learning.engine import Engine
+from mjcartpole.learning.engine import Engine, compiling
 from mjcartpole.learning.folders import free_folder, locked_folder
+from mjcartpole.learning.naming import in_flags, namesakes, run_name
 from mjcartpole.learning.session import CHECKPOINT_EVERY, Session, check_interval
 from mjcartpole.learning.training import Training, TrainResult
 from mjcartpole.physics.model import CartPole
+from mjcartpole.physics.playable import why_unplayable
 from mjcartpole.physics.simulation import silence_mujoco
-from mjcartpole.render_command import film
+from mjcartpole.render_command import film_result, remove_film
 from mjcartpole.signals import Interrupted, StopSignals
 from mjcartpole.studies import seed_runs
 from mjcartpole.studies.conduct import conclude
-from mjcartpole.studies.film import Look, Stage, play
-from mjcartpole.studies.seeds import Crew, ManyResult
-from mjcartpole.studies.statistics import CONFIDENCE
+from mjcartpole.studies.seeds import Crew
 
 RUNNING_MEAN = 100
 """Episodes in the progress bar's mean."""
@@ -75,28 +77,39 @@ class Where:
     run_dir: Path | None = None
     overwrite: bool = False
 
-    def folder(self, name: str) -> Path:
-        """The run's folder."""
-        return self.run_dir or free_folder(RUNS, f"{self.preset}-{name}")
+    def folder(self, config: TrainConfig, seeds: int = 1) -> Path:
+        """The run's folder: with overwrite the very one, else one that is not there yet."""
+        name = run_name(self.preset, config, seeds)
+        return self.run_dir or (RUNS / name if self.overwrite else free_folder(RUNS, name))
+
+    def about(self, folder: Path, config: TrainConfig, seeds: int = 1) -> str:
+        """What a header says of a run: what was changed, and where it goes if its name is taken."""
+        first = RUNS / run_name(self.preset, config, seeds)
+        if self.run_dir or folder == first:
+            return _changes(self.preset, config)
+        there = f"\n{first} is there already: this goes to {folder}{_unfinished(folder)}"
+        return _changes(self.preset, config) + there
 
 
 def run_train(config: TrainConfig, how: How, where: Where) -> int:
     """Train, evaluate, film; print what came out. Returns the exit code.
 
     Raises:
-        Interrupted: After Ctrl-C or SIGTERM, when what was learned is kept; says where.
+        Interrupted: After Ctrl-C, SIGTERM or SIGHUP, when what was learned is kept; says where.
     """
     cartpole = _prepare(config, how)
-    folder, preset = where.folder(f"{config.backend}-seed{config.seed}"), where.preset
-    if how.video:
-        check_writable(make_folder(VIDEOS))
+    folder, preset = where.folder(config), where.preset
     signals = StopSignals()
     with signals.caught(), runs.claimed_folder(folder, overwrite=where.overwrite):
+        if how.video:
+            check_writable(make_folder(VIDEOS))
         training = Training(config, engine=how.engine, cartpole=cartpole)
         print(
-            f"{preset} on {config.backend}: {config.episodes:,} episodes, seed {config.seed}",
+            f"{preset} on {config.backend}: {counted(config.episodes, 'episode')}, "
+            f"seed {config.seed}" + where.about(folder, config),
             flush=True,
         )
+        remove_film(folder)
         runs.begin_run(folder, config, cartpole, preset=preset, video=how.video)
         session = Session(folder, training, cartpole, every=how.checkpoint_every)
         _conduct(session, folder, cartpole, preset, how, signals)
@@ -119,7 +132,7 @@ def run_resume(path: Path, how: How) -> int:
     if path.is_dir() and runs.is_complete(folder):
         with locked_folder(folder):
             pass  # A lock that a killed training has left goes.
-        print(f"{folder} is complete: nothing is left to do")
+        print(f"{folder} is complete: nothing is left to do{_unfinished(folder)}")
         return 0
     signals = StopSignals()
     with signals.caught(), runs.resumed_folder(path) as begun:
@@ -129,7 +142,8 @@ def run_resume(path: Path, how: How) -> int:
         session.resume(begun.checkpoint)
         print(
             f"{begun.preset} on {config.backend}: goes on after {len(training.log):,} of "
-            f"{config.episodes:,} episodes, seed {config.seed}",
+            f"{counted(config.episodes, 'episode')}, seed {config.seed}"
+            f"{_changes(begun.preset, config)}",
             flush=True,
         )
         _conduct(session, folder, begun.cartpole, begun.preset, how, signals)
@@ -140,23 +154,25 @@ def run_seeds(config: TrainConfig, how: How, where: Where, *, seeds: int) -> int
     """Train many seeds side by side, and print statistics over them. Returns the exit code.
 
     Raises:
-        Interrupted: After Ctrl-C or SIGTERM, when what was learned is kept; says where.
+        Interrupted: After Ctrl-C, SIGTERM or SIGHUP, when what was learned is kept; says where.
     """
     cartpole = _prepare(config, how)
-    folder = where.folder(f"{config.backend}-seeds{config.seed}-{config.seed + seeds - 1}")
-    preset = where.preset
+    folder, preset = where.folder(config, seeds), where.preset
     crew = _crew(config, seeds, cartpole, folder, preset, how)
     signals = StopSignals()
     with signals.caught(), seed_runs.claimed_seeds(folder, overwrite=where.overwrite):
         seed_runs.begin_seeds(folder, config, crew.seeds, cartpole, preset=preset)
-        return _conduct_seeds(crew, config, folder, preset, signals)
+        return _conduct_seeds(
+            crew, config, where.about(folder, config, seeds), folder, preset, signals
+        )
 
 
 def _resume_seeds(folder: Path, how: How) -> int:
     signals = StopSignals()
     with signals.caught(), seed_runs.resumed_seeds(folder) as begun:
         crew = _crew(begun.config, begun.seeds, begun.cartpole, folder, begun.preset, how)
-        return _conduct_seeds(crew, begun.config, folder, begun.preset, signals)
+        about = _changes(begun.preset, begun.config)
+        return _conduct_seeds(crew, begun.config, about, folder, begun.preset, signals)
 
 
 def _prepare(config: TrainConfig, how: How) -> CartPole:
@@ -166,6 +182,9 @@ def _prepare(config: TrainConfig, how: How) -> CartPole:
     cartpole = config.load_model()
     config.discretizer(cartpole.poles)
     runs.check_storable(cartpole)
+    why = why_unplayable(cartpole, config.integrator) if config.backend == "mujoco" else None
+    if why:
+        print(f"mjcartpole: {why}", file=sys.stderr)
     return cartpole
 
 
@@ -201,12 +220,12 @@ def _conduct(
         print_evaluation(greedy)
         print(f"\nrun    {folder}", flush=True)
         if how.video:
-            _film_result(result, cartpole, folder, summary, signals)
+            film_result(result, cartpole, folder, summary, signals)
         runs.finish_run(folder)
     except Interrupted as interrupted:
         raise Interrupted(
-            f"interrupted after {len(session.training.log):,} of {config.episodes:,} episodes"
-            + _kept(folder),
+            f"interrupted after {len(session.training.log):,} of "
+            f"{counted(config.episodes, 'episode')}" + _kept(folder),
             signals.number,
         ) from interrupted
 
@@ -214,33 +233,28 @@ def _conduct(
 def _kept(folder: Path) -> str:
     if not (folder / LATEST).exists():
         return ", before anything was saved"
-    return f"; what was learned is kept in {folder}; go on with: mjcartpole train --resume {folder}"
+    return f"; what was learned is kept in {folder}; go on with: {_resume(folder)}"
 
 
-def _film_result(
-    result: TrainResult,
-    cartpole: CartPole,
-    folder: Path,
-    summary: dict[str, Any],
-    signals: StopSignals,
-) -> None:
-    config = result.config
-    stage = Stage(
-        name=folder.resolve().name,
-        policy=result.policy,
-        backend=config.backend,
-        model=cartpole if config.backend == "mujoco" else "cartpole",
-        integrator=config.integrator,
-    )
-    path = VIDEOS / f"{stage.name}.mp4"
-    film([play(stage)], Look(), path, signals)
-    summary["video"] = str(path)
-    runs.write_summary(folder, summary)
+def _resume(folder: Path) -> str:
+    return f"mjcartpole train --resume {shlex.quote(str(folder))}"
+
+
+def _changes(preset: str, config: TrainConfig) -> str:
+    flags = in_flags(preset, config)
+    return f", with {flags}" if flags else ""
+
+
+def _unfinished(folder: Path) -> str:
+    """How to go on with runs of the same name, but for its number, that are not complete."""
+    begun = [path for path in namesakes(folder) if (path / runs.CONFIG).is_file()]
+    hints = [_resume(path) for path in begun if path != folder and not runs.is_complete(path)]
+    return f"; unfinished beside it: {', '.join(hints)}" if hints else ""
 
 
 def _train_with_progress(session: Session, signals: StopSignals) -> None:
     columns = (
-        TextColumn("training"),
+        _Doing(),
         BarColumn(),
         MofNCompleteColumn(),
         TextColumn("episodes, mean return {task.fields[mean]:5.1f}"),
@@ -253,6 +267,12 @@ def _train_with_progress(session: Session, signals: StopSignals) -> None:
         for finished in session.run(signals.stop):
             recent = training.log.storage.totals[max(0, finished - RUNNING_MEAN) : finished]
             progress.update(bar, completed=finished, mean=recent.mean())
+    if progress.console.is_terminal:
+        # No two runs take the same time: what stdout says is the same each time.
+        result = training.result()
+        rate = result.steps / result.seconds if result.seconds else 0.0
+        speed = f"{result.steps:,} steps in {result.seconds:.1f} s ({rate:,.0f} per second)"
+        print(speed, file=sys.stderr, flush=True)
 
 
 def _crew(
@@ -277,28 +297,28 @@ def _crew(
 
 
 def _conduct_seeds(
-    crew: Crew, config: TrainConfig, folder: Path, preset: str, signals: StopSignals
+    crew: Crew, config: TrainConfig, about: str, folder: Path, preset: str, signals: StopSignals
 ) -> int:
     """Train all seeds or to a signal; write and print."""
     print(
-        f"{preset} on {config.backend}: {len(crew.seeds)} seeds from {crew.seeds[0]}, "
-        f"{config.episodes:,} episodes each, {crew.workers} at once\n",
+        f"{preset} on {config.backend}: {counted(len(crew.seeds), 'seed')} from {crew.seeds[0]}, "
+        f"{counted(config.episodes, 'episode')} each, {crew.workers} at once{about}\n",
         flush=True,
     )
-    columns = (TextColumn("training"), BarColumn(), MofNCompleteColumn(), TextColumn("seeds"))
+    columns = (_Doing(), BarColumn(), MofNCompleteColumn(), TextColumn("seeds"))
     with _progress(*columns) as progress, signals.deferred():
         bar = progress.add_task("", total=len(crew.seeds))
         for found in crew.run(signals.stop):
             progress.update(bar, advance=0 if found is None else 1)
     many = crew.result()
     seed_runs.write_seeds(folder, many)
-    _print_seeds(many)
+    print_seeds(many)
     print(f"\nruns   {folder}", flush=True)
     if signals.stop():
         done = len(many.scores)
         raise Interrupted(
             f"interrupted with {done} of {len(crew.seeds)} seeds done; what was learned is kept in "
-            f"{folder}; go on with: mjcartpole train --resume {folder}",
+            f"{folder}; go on with: {_resume(folder)}",
             signals.number,
         )
     for found in many.failed:
@@ -313,29 +333,11 @@ def _print_learning(result: TrainResult) -> None:
     for start in range(0, len(returns), every):
         block = returns[start : start + every]
         print(f"{start + len(block):8,} {block.mean():13.1f}")
-    rate = result.steps / result.seconds if result.seconds else 0.0
-    print(f"\n{result.steps:,} steps in {result.seconds:.1f} s ({rate:,.0f} per second)")
 
 
-def _print_seeds(many: ManyResult) -> None:
-    """A line per seed, and the statistics over them."""
-    print("   seed   greedy mean   minimum")
-    for found in many.seeds:
-        if found.evaluation is not None:
-            mean, minimum = found.evaluation["mean"], found.evaluation["minimum"]
-            print(f"{found.seed:7d} {mean:13.2f} {minimum:9.0f}")
-        else:
-            print(f"{found.seed:7d} {'failed' if found.error else 'stopped':>13s}")
-    aggregate = many.aggregate()
-    if aggregate is None:
-        return
-    low, high = aggregate.interval
-    print(
-        f"\nmean {aggregate.mean:.2f}, minimum {aggregate.minimum:.2f}\n"
-        f"interquartile mean {aggregate.iqm:.2f} "
-        f"({CONFIDENCE:.0%} interval {low:.2f} to {high:.2f})\n"
-        f"solved (at least {aggregate.solved_at:g}): {aggregate.solved:.0%}"
-    )
+class _Doing(ProgressColumn):
+    def render(self, task: Task) -> Text:
+        return Text("compiling" if compiling else "training")
 
 
 def _progress(*columns: ProgressColumn) -> Progress:

@@ -12,13 +12,22 @@ from typing import Any
 
 from PIL import Image
 
-from mjcartpole.commands import Choice, set_stage
+from mjcartpole.commands import Choice, learned_seeds, set_stage
 from mjcartpole.errors import ConfigError
-from mjcartpole.files import check_writable, make_folder, replacing, write_whole
+from mjcartpole.files import (
+    check_free,
+    check_writable,
+    free_path,
+    make_folder,
+    replacing,
+    write_whole,
+)
 from mjcartpole.integrator import Integrator
+from mjcartpole.learning import runs
 from mjcartpole.learning.policy import Policy
 from mjcartpole.physics.model import Edits, model_names
 from mjcartpole.physics.simulation import silence_mujoco
+from mjcartpole.studies import seed_runs
 from mjcartpole.studies.evaluation import EPISODES, SEED
 from mjcartpole.studies.heatmap import curves, heat_map
 from mjcartpole.studies.sweep import SweepResult, parse_sweep, sweep
@@ -26,6 +35,8 @@ from mjcartpole.studies.transfer import GYM, Cell, TransferResult, find_place, t
 
 TRANSFER = Path("transfer")
 """Where the files go, unless told otherwise."""
+
+SUFFIXES = (".csv", ".json", ".png")
 
 FAILED = 2
 
@@ -41,7 +52,8 @@ def run_transfer(
     episodes: int = EPISODES,
     seed: int = SEED,
     workers: int | None = None,
-    output: Path = TRANSFER,
+    output: Path | None = None,
+    overwrite: bool = False,
 ) -> int:
     """Play policies on models they were not trained on, print and write. Returns the exit code.
 
@@ -57,7 +69,9 @@ def run_transfer(
         episodes: Greedy episodes of each policy on each model.
         seed: Seeds the starting states.
         workers: How many evaluations at once; as many as there are cores if left out.
-        output: Folder for the CSV, JSON and PNG.
+        output: Folder for the CSV, JSON and PNG; None: transfer/, with a number in their names
+            where such are there.
+        overwrite: Replace what is there.
 
     Raises:
         MjCartPoleError: Something cannot be used; nothing has been played then.
@@ -69,41 +83,68 @@ def run_transfer(
     if swept is None:
         chosen = dict.fromkeys(models or _fitting(policies))
         places = [find_place(model, edits, **physics) for model in chosen]
-        check_writable(make_folder(output))
+        target = _target(output, "transfer", overwrite)
         matrix = transfer(policies, places, **settings)
         _print_matrix(matrix)
+        _say_seeds(policies)
         rows = [cell.summary() for cell in matrix.cells]
-        _write(output, "transfer", rows, matrix.summary(), heat_map(matrix))
+        _write(target, rows, matrix.summary(), heat_map(matrix))
         return _tell_failed(matrix)
     key, values = parse_sweep(swept)
     if len(models) > 1:
         raise ConfigError(f"a sweep edits one model, not {len(models)}; give one, or no --sweep")
-    model = models[0] if models else set_stage(sources[0], Choice()).model
-    check_writable(make_folder(output))
+    own = sources[0] / runs.MODEL if seed_runs.is_seeds(sources[0]) else None
+    model = models[0] if models else own or set_stage(sources[0], Choice()).model
+    target = _target(output, "sweep-" + re.sub(r"[^\w.-]+", "-", key), overwrite)
     curve = sweep(policies, model, key, values, edits=edits, **physics, **settings)
     _print_sweep(curve)
+    _say_seeds(policies)
     summary = curve.summary()
-    name = "sweep-" + re.sub(r"[^\w.-]+", "-", key)
-    _write(output, name, summary["points"], summary, curves(curve))
+    _write(target, summary["points"], summary, curves(curve))
     return _tell_failed(curve.played)
 
 
-def _fitting(policies: Mapping[str, Policy]) -> list[str]:
+def _fitting(policies: Mapping[str, Sequence[Policy]]) -> list[str]:
     """All models that there are, and gym, but for those that no policy is for."""
-    poles = {policy.poles for policy in policies.values()}
+    poles = {policy.poles for group in policies.values() for policy in group}
     return [name for name in (GYM, *model_names()) if find_place(name).poles in poles]
 
 
-def _find_policies(sources: Sequence[Path]) -> dict[str, Policy]:
-    """Policies by name; those of one name are called by their paths."""
+def _target(output: Path | None, name: str, overwrite: bool) -> Path:
+    """Where the table goes; the JSON and the picture beside it."""
+    table = (output or TRANSFER) / f"{name}{SUFFIXES[0]}"
+    if not overwrite and output is None:
+        table = free_path(table, SUFFIXES)
+    elif not overwrite:
+        check_free([table.with_suffix(suffix) for suffix in SUFFIXES])
+    check_writable(make_folder(table.parent))
+    return table
+
+
+def _find_policies(sources: Sequence[Path]) -> dict[str, tuple[Policy, ...]]:
+    """Policies by name, of many seeds all under one; those of one name are called by paths."""
     if not sources:
         raise ConfigError("transfer needs a RUN-OR-POLICY, or several")
-    stages = {source: set_stage(source, Choice()) for source in sources}
-    count = Counter(stage.name for stage in stages.values())
+    found = {source: _members(source) for source in sources}
+    count = Counter(name for name, _ in found.values())
     return {
-        stage.name if count[stage.name] == 1 else str(source): stage.policy
-        for source, stage in stages.items()
+        name if count[name] == 1 else str(source): policies
+        for source, (name, policies) in found.items()
     }
+
+
+def _members(source: Path) -> tuple[str, tuple[Policy, ...]]:
+    if seed_runs.is_seeds(source):
+        learned = learned_seeds(source).values()
+        return source.resolve().name, tuple(runs.load_run(run).policy for run in learned)
+    stage = set_stage(source, Choice())
+    return stage.name, (stage.policy,)
+
+
+def _say_seeds(policies: Mapping[str, Sequence[Policy]]) -> None:
+    for name, group in policies.items():
+        if len(group) > 1:
+            print(f"{name}: the mean over {len(group)} seeds, and its interval over seeds")
 
 
 def _print_matrix(result: TransferResult) -> None:
@@ -144,18 +185,18 @@ def _short(name: str, most: int = 30) -> str:
 
 
 def _write(
-    folder: Path,
-    name: str,
+    table: Path,
     rows: Sequence[Mapping[str, Any]],
     summary: Mapping[str, Any],
     picture: Image.Image,
 ) -> None:
-    write_whole(folder / f"{name}.csv", _csv(rows))
+    _, as_json, drawn = (table.with_suffix(suffix) for suffix in SUFFIXES)
+    write_whole(table, _csv(rows))
     text = json.dumps(summary, indent=2, allow_nan=False)
-    write_whole(folder / f"{name}.json", text + "\n")
-    with replacing(folder / f"{name}.png") as temporary:
+    write_whole(as_json, text + "\n")
+    with replacing(drawn) as temporary:
         picture.save(temporary)
-    print(f"\nwritten {folder / name}.csv, .json and .png")
+    print(f"\nwritten {table}, {as_json.suffix} and {drawn.suffix}")
 
 
 def _csv(rows: Sequence[Mapping[str, Any]]) -> str:

@@ -19,6 +19,7 @@ from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.training import Training, TrainResult
 from mjcartpole.media.renderer import open_renderer
 from mjcartpole.media.video import write_video
+from mjcartpole.output import stdout_problem
 from mjcartpole.physics.model import CartPole, find_model, self_contained
 from mjcartpole.physics.simulation import silence_mujoco
 from mjcartpole.signals import Interrupted, StopSignals
@@ -163,7 +164,7 @@ def run_watch(
     Raises:
         ModelNotFoundError: There is no such file.
         ConfigError: A setting makes no sense.
-        Interrupted: After Ctrl-C or SIGTERM.
+        Interrupted: After Ctrl-C, SIGTERM or SIGHUP.
     """
     silence_mujoco()
     check_integrator(integrator)
@@ -210,6 +211,8 @@ def _watch(watched: Watched, recipe: Recipe, once: int | None) -> None:
         if once is not None and done >= once:
             return
         while not watched.has_changed():
+            if stdout_problem() is not None:
+                return  # Nobody looks any more.
             time.sleep(POLL)
         watched.take()
 
@@ -285,12 +288,9 @@ def _verdicts(results: list[Result]) -> str:
 def _train(config: TrainConfig, cartpole: CartPole, check: Callable[[], None]) -> TrainResult:
     """Train; with fewer episodes where this model would take too long."""
     training = Training(config, cartpole=cartpole)
-    first: TrainResult | None = None
     for _ in training.run():
         check()
-        now = training.result()
-        first = first or now
-        episodes = _affordable(first, now)
+        episodes = _affordable(training.result())
         if episodes < config.episodes:
             _say("training", f"{episodes:,} episodes instead of {config.episodes:,}: it is slow")
             training = Training(dataclasses.replace(config, episodes=episodes), cartpole=cartpole)
@@ -307,18 +307,12 @@ def _train(config: TrainConfig, cartpole: CartPole, check: Callable[[], None]) -
     return result
 
 
-def _affordable(first: TrainResult, now: TrainResult) -> int:
-    """How many episodes there is time for, should all of them last to the time limit.
-
-    Args:
-        first: After the first chunk, in which the loop may have been compiled.
-        now: After a later one.
-    """
+def _affordable(now: TrainResult) -> int:
+    """How many episodes there is time for, should all of them last to the time limit."""
     asked = now.config.episodes
-    seconds, steps = now.seconds - first.seconds, now.steps - first.steps
-    if seconds < _TRIAL or not steps:
+    if now.seconds < _TRIAL:
         return asked
-    seconds_per_episode = seconds / steps * TIME_LIMIT
+    seconds_per_episode = now.seconds / now.steps * TIME_LIMIT
     left = asked - len(now.returns)
     if now.seconds + left * seconds_per_episode <= PATIENCE:
         return asked

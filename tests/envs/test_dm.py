@@ -1,6 +1,8 @@
 """CartPole-v1 for dm_control users."""
 
+import copy
 import doctest
+import pickle
 import subprocess
 import sys
 
@@ -77,6 +79,7 @@ def test_specs():
     assert (spec.minimum.item(), spec.maximum.item()) == (-1.0, 1.0)
     assert list(env.observation_spec()) == ["position", "velocity"]
     assert env.control_timestep() == 0.02
+    assert spec.minimum.shape == spec.maximum.shape == (1,)
     discrete = dm.load("balance", discrete=True).action_spec()
     assert isinstance(discrete, specs.DiscreteArray)
     assert discrete.num_values == 2
@@ -169,6 +172,58 @@ def test_a_seed_repeats_and_no_seed_does_not():
     assert free not in (first, other)
     expected, _ = mjcartpole.CartPoleEnv().reset(seed=7)
     assert np.float32(first).tolist() == expected[[0, 2]].tolist()
+
+
+def positions(env):
+    return env.reset().observation["position"].tolist()
+
+
+def test_a_task_is_seeded_as_those_of_dm_controls_suite():
+    env = dm.load("balance", seed=5)
+    first, second = positions(env), positions(env)
+    env.task.random.seed(5)
+    assert [positions(env), positions(env)] == [first, second]
+    # Wrappers put a generator of their own in its place.
+    starts = []
+    for _ in range(2):
+        env.task._random = np.random.RandomState(3)
+        assert env.task.random is env.task._random
+        starts.append(positions(env))
+    assert starts[0] == starts[1] != first
+    given = dm.Balance(load_model(), random=np.random.RandomState(3), limit=9, discrete=False)
+    assert given.random.uniform() == np.random.RandomState(3).uniform()
+
+
+@pytest.mark.parametrize("how", [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))])
+def test_a_copy_goes_on_bit_for_bit(how):
+    env = dm.load("balance", model=FRICTION, seed=5)
+    env.reset()
+    for _ in range(4):
+        env.step([0.3])
+    copied = how(env)
+    for _ in range(60):
+        mine, its = env.step([0.1]), copied.step([0.1])
+        assert mine.observation["position"].tobytes() == its.observation["position"].tobytes()
+    copied.task.random.seed(1)
+    env.task.random.seed(1)
+    assert positions(copied) == positions(env)
+    assert env.physics.copy().cart_position() == env.physics.cart_position()
+
+
+def test_rewards_are_shown_where_that_is_wanted():
+    plain, shown = (dm.load("balance", seed=0, visualize_reward=each) for each in (False, True))
+    for env in (plain, shown):
+        env.reset()
+    own, after = plain.physics.model.geom_rgba, shown.physics.model.geom_rgba
+    changed = (own != after).any(axis=1)
+    names = {shown.physics.model.id2name(geom, "geom") for geom in changed.nonzero()[0]}
+    assert "pole" in names
+    assert not any("cart" in name for name in names)
+    np.testing.assert_array_equal(after[changed, :3], np.float32([dm.HIGHLIGHT] * changed.sum()))
+    shown.physics.show(-1.0)
+    np.testing.assert_array_equal(own, after)
+    with pytest.raises(ConfigError, match="True or False"):
+        shown.task.visualize_reward = 1
 
 
 def test_edits():

@@ -1,8 +1,10 @@
 """The vector of environments, against single ones and against gymnasium's own vector."""
 
+import copy
 import doctest
 import gc
 import os
+import pickle
 import subprocess
 import sys
 import weakref
@@ -117,9 +119,9 @@ def test_each_environment_is_a_single_one_bit_for_bit(name, integrator, seed, th
     envs.reset(seed=seed)
     if far:
         # Where the stops are, and quick enough to reach them.
-        envs.state = generator.uniform((2.1, 1, -0.1, -1), (2.3, 3, 0.1, 1), (n, 4))
+        envs.state = generator.uniform((2.1, 1, -0.1, -1), (2.3, 3, 0.1, 1), (n, 4)).T
     ages, restarting = np.zeros(n, int), np.zeros(n, bool)
-    for single, state in zip(singles, envs.state, strict=True):
+    for single, state in zip(singles, envs.state.T, strict=True):
         single.state = state
     for _ in range(60):
         actions = generator.integers(0, 2, n)
@@ -127,13 +129,13 @@ def test_each_environment_is_a_single_one_bit_for_bit(name, integrator, seed, th
         for i, single in enumerate(singles):
             if restarting[i]:
                 single.reset()
-                single.state = envs.state[i]
+                single.state = envs.state[:, i]
                 ages[i] = 0
                 assert (rewards[i], terminations[i], truncations[i]) == (0.0, False, False)
                 continue
             observation, reward, terminated, _, _ = single.step(int(actions[i]))
             ages[i] += 1
-            assert envs.state[i].tobytes() == single.state.tobytes()
+            assert envs.state[:, i].tobytes() == single.state.tobytes()
             assert observations[i].tobytes() == observation.tobytes()
             assert (rewards[i], terminations[i]) == (reward, terminated)
             assert truncations[i] == (ages[i] >= limit)
@@ -155,7 +157,7 @@ def test_the_models_of_the_comparison_do_what_their_names_say():
     still = (0.0, 1.0, 0.0, 0.0)
     assert after("limited, half steps", still)[1] < after("half steps", still)[1] - 0.1
     assert after("rubbing, quarter steps", still)[1] < after("half steps", still)[1] - 0.001
-    assert CartPoleVectorEnv(model=MODELS["sleeping"])._batch.persistent
+    assert CartPoleVectorEnv(model=MODELS["sleeping"])._simulation._batch.persistent
 
 
 @pytest.mark.parametrize("integrator", ["gym", "mujoco"])
@@ -193,7 +195,7 @@ def test_equal_to_gymnasiums_vector(sutton_barto, integrator, kinematics, seed, 
         assert [array.shape for array in mine] == [array.shape for array in its]
         endings += mine[2].sum() + mine[3].sum()
     assert endings >= 3 * n
-    np.testing.assert_allclose(envs.state, reference.unwrapped.state.T, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(envs.state, reference.unwrapped.state, rtol=0, atol=1e-12)
 
 
 def test_a_restart_takes_gymnasiums_draws_and_ignores_the_action():
@@ -205,7 +207,7 @@ def test_a_restart_takes_gymnasiums_draws_and_ignores_the_action():
             *_, truncations, _ = each.step(np.ones(3, dtype=int))
         assert truncations.all()
         each.step(np.zeros(3, dtype=int))
-    np.testing.assert_array_equal(envs.state, reference.unwrapped.state.T)
+    np.testing.assert_array_equal(envs.state, reference.unwrapped.state)
 
 
 @pytest.mark.parametrize("steps", [3, 5])
@@ -231,14 +233,96 @@ def test_bounds_of_the_start_hold_until_the_next_reset():
         for observations in (first, again):
             assert observations.min() >= 0.01
             assert observations.max() <= 0.02
-    np.testing.assert_array_equal(again, envs.state.astype(np.float32))
+    np.testing.assert_array_equal(again.T, envs.state.astype(np.float32))
     assert envs.reset(seed=3)[0].min() < 0
 
 
-@pytest.mark.parametrize("options", [{"low": 1.0, "high": 0.0}, {"low": "x"}, {"high": None}])
-def test_bounds_that_make_no_sense(options):
-    with pytest.raises(ValueError, match=r"Lower bound|could not be converted"):
-        CartPoleVectorEnv(2).reset(options=options)
+def mask(*values):
+    return np.array(values, dtype=bool)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"low": 1.0, "high": 0.0}, r"low \(1.0\) is above high"),
+        ({"low": "x"}, "low is a finite number, not 'x'"),
+        ({"edits": {"pole.length": 1}}, "no option 'edits'; available: low, high, reset_mask"),
+        ({"reset_mask": [True, False]}, "array of 2 booleans"),
+        ({"reset_mask": np.array([1, 0])}, "array of 2 booleans"),
+        ({"reset_mask": mask(True)}, "array of 2 booleans"),
+        ({"reset_mask": mask(False, False)}, "one at least True"),
+    ],
+)
+def test_options_that_make_no_sense(options, message):
+    envs = CartPoleVectorEnv(2)
+    envs.reset(seed=3)
+    before = envs.state, envs.np_random.bit_generator.state
+    with pytest.raises(ConfigError, match=message):
+        envs.reset(seed=4, options=options)
+    # Nothing has been reset by half.
+    np.testing.assert_array_equal(envs.state, before[0])
+    assert envs.np_random.bit_generator.state == before[1]
+
+
+def test_a_mask_says_who_starts():
+    envs = CartPoleVectorEnv(3, max_episode_steps=4)
+    with pytest.raises(ResetNeededError, match="without reset_mask first"):
+        envs.reset(options={"reset_mask": mask(True, False, True)})
+    envs.reset(seed=0)
+    for _ in range(3):
+        envs.step([0, 1, 0])
+    before = envs.state
+    options = {"reset_mask": mask(True, False, True), "low": 0.01, "high": 0.02}
+    observations, _ = envs.reset(options=options)
+    np.testing.assert_array_equal(envs.state[:, 1], before[:, 1])
+    np.testing.assert_array_equal(observations.T, envs.state.astype(np.float32))
+    assert (envs.state[:, [0, 2]] >= 0.01).all()
+    assert (envs.state[:, [0, 2]] <= 0.02).all()
+    truncations = [envs.step([0, 1, 0])[3].tolist() for _ in range(5)]
+    assert truncations[0] == [False, True, False]
+    assert truncations[3] == [True, False, True]
+    # Those who are started by hand at their end do not start by themselves once more.
+    observations, _ = envs.reset(options={"reset_mask": mask(False, True, False)})
+    assert envs.step([0, 1, 0])[1].tolist() == [1.0, 1.0, 1.0]
+
+
+COPIES = {"deepcopy": copy.deepcopy, "copy": copy.copy}
+COPIES["pickle"] = lambda envs: pickle.loads(pickle.dumps(envs))
+
+
+@pytest.mark.parametrize("how", COPIES)
+@pytest.mark.parametrize("name", ["reference", "all at once"])
+def test_a_copy_goes_on_bit_for_bit_and_by_itself(name, how):
+    envs = gymnasium.make_vec(ENV_ID, num_envs=5, max_episode_steps=20, model=MODELS[name])
+    run(envs, 33)
+    before = envs.state
+    copied = COPIES[how](envs)
+    assert (copied.spec.id, copied.num_envs) == (ENV_ID, 5)
+    actions = np.random.default_rng(1).integers(0, 2, (50, 5))
+    after = [copied.step(each)[:4] for each in actions]
+    np.testing.assert_array_equal(envs.state, before)
+    for each, results in zip(actions, after, strict=True):
+        for mine, its in zip(envs.step(each)[:4], results, strict=True):
+            assert mine.tobytes() == its.tobytes()
+    assert copied.state.tobytes() == envs.state.tobytes()
+    assert copied.reset(seed=3)[0].tobytes() == envs.reset(seed=3)[0].tobytes()
+
+
+def test_a_copy_of_what_was_drawn_draws_by_itself():
+    envs = CartPoleVectorEnv(2, render_mode="rgb_array", width=64, height=48)
+    envs.reset(seed=0)
+    pictures = envs.render()
+    copied = copy.deepcopy(envs)
+    envs.close()
+    for mine, its in zip(pictures, copied.render(), strict=True):
+        np.testing.assert_array_equal(mine, its)
+    copied.close()
+
+
+def test_a_vector_that_remembers_more_than_its_state_is_not_copied():
+    envs = CartPoleVectorEnv(2, model=MODELS["sleeping"])
+    with pytest.raises(ConfigError, match="cannot be copied"):
+        copy.deepcopy(envs)
 
 
 def test_a_start_beyond_the_limits_ends_with_the_step_after_it():
@@ -254,8 +338,8 @@ def test_a_start_beyond_the_limits_ends_with_the_step_after_it():
 def test_limits_are_strict(place, sign):
     envs = CartPoleVectorEnv(2)
     limit = (task.X_LIMIT, 0, task.THETA_LIMIT)[place]
-    states = np.zeros((2, 4))
-    states[:, place] = sign * limit, sign * np.nextafter(limit, np.inf)
+    states = np.zeros((4, 2))
+    states[place] = sign * limit, sign * np.nextafter(limit, np.inf)
     envs.state = states
     assert envs.step([0, 1])[2].tolist() == [False, True]
 
@@ -285,7 +369,6 @@ def test_what_was_returned_may_be_written():
         for array, other in zip(results[:4], expected[:4], strict=True):
             np.testing.assert_array_equal(array, other)
             array[...] = 1
-        envs.state[...] = 7
 
 
 def test_observations_are_contiguous():
@@ -328,10 +411,10 @@ BAD_ACTIONS = [
 @pytest.mark.parametrize("actions", GOOD_ACTIONS, ids=repr)
 def test_actions_that_the_space_contains(actions):
     envs = CartPoleVectorEnv(2)
-    envs.state = np.zeros((2, 4))
+    envs.state = np.zeros((4, 2))
     assert envs.action_space.contains(actions)
     envs.step(actions)
-    assert np.sign(envs.state[:, 1]).tolist() == [-1, 1]
+    assert np.sign(envs.state[1]).tolist() == [-1, 1]
 
 
 @pytest.mark.parametrize("actions", BAD_ACTIONS, ids=repr)
@@ -352,25 +435,32 @@ def test_a_step_needs_a_reset():
         envs.step(np.array([0, 1]))
 
 
-def test_the_state_is_read_and_set():
-    envs = CartPoleVectorEnv(2)
-    values = np.array([[0.1, 0.2, 0.03, 0.4], [-0.1, 0.0, 0.01, 0.3]])
-    envs.state = values
-    values[0] = 9.0
-    envs.state[1] = 9.0
+def test_the_state_is_read_and_set_as_in_gymnasiums_vector():
+    envs, reference = CartPoleVectorEnv(3), gymnasium.make_vec("CartPole-v1", num_envs=3)
+    for each in (envs, reference):
+        each.reset(seed=5)
     assert envs.state.dtype == np.float64
-    assert envs.state.tolist() == [[0.1, 0.2, 0.03, 0.4], [-0.1, 0.0, 0.01, 0.3]]
-    with pytest.raises(ConfigError, match=r"states have the shape \(2, 4\)"):
-        envs.state = np.zeros((4, 2))
+    np.testing.assert_array_equal(envs.state, reference.unwrapped.state)
+    values = np.array([[0.1, 0.2, 0.03], [0.4, -0.1, 0.0], [0.01, 0.3, 0.0], [0.0, 0.0, 0.1]])
+    envs.state = values
+    expected = values.tolist()
+    values[0] = 9.0
+    assert envs.state.tolist() == expected
+    with pytest.raises(ValueError, match="read-only"):
+        envs.state[1] = 9.0
+    with pytest.raises(
+        ConfigError, match=r"states have the shape \(4, 3\).*not the shape \(3, 4\)"
+    ):
+        envs.state = np.zeros((3, 4))
 
 
 def test_a_state_set_between_steps_leaves_the_episodes_as_they_are():
     envs = CartPoleVectorEnv(2, max_episode_steps=2)
     envs.reset(seed=0)
     envs.step([0, 1])
-    envs.state = np.zeros((2, 4))
+    envs.state = np.zeros((4, 2))
     assert envs.step([0, 1])[3].all()
-    envs.state = np.full((2, 4), np.nan)
+    envs.state = np.full((4, 2), np.nan)
     # They restart, so what they were in does not matter.
     assert envs.step([0, 1])[1].tolist() == [0.0, 0.0]
     assert np.abs(envs.state).max() <= 0.05
@@ -380,8 +470,8 @@ def test_a_state_set_between_steps_leaves_the_episodes_as_they_are():
 @pytest.mark.parametrize("place", range(4))
 def test_an_environment_that_diverged_is_named(bad, place):
     envs = CartPoleVectorEnv(3)
-    states = np.zeros((3, 4))
-    states[1, place] = bad
+    states = np.zeros((4, 3))
+    states[place, 1] = bad
     envs.state = states
     with pytest.raises(SimulationError, match=r"cartpole \(environment 1 of 3\) diverged"):
         envs.step([0, 1, 0])
@@ -399,12 +489,36 @@ def test_a_diverging_model_is_an_error_on_any_thread(integrator):
             envs.step(np.ones(64, dtype=int))
 
 
+@pytest.mark.parametrize("threads", [1, None])
+@pytest.mark.parametrize("integrator", ["gym", "mujoco"])
+def test_what_mujoco_gives_up_on_is_an_error_of_ours(integrator, threads):
+    # Too little memory for the contacts with the stops.
+    tight = edited(*TOUCHING, ("<option", '<size memory="11000"/><option'))
+    envs = CartPoleVectorEnv(8, model=tight.xml, integrator=integrator, threads=threads)
+    envs.state = np.tile([[2.3], [3.0], [0.0], [0.0]], 8)
+    with pytest.raises(SimulationError, match="MuJoCo gave up on"):
+        for _ in range(10):
+            envs.step(np.ones(8, dtype=int))
+
+
+def test_edits_may_be_texts():
+    envs = gymnasium.make_vec(ENV_ID, num_envs=2, edits=["pole.length=1.5"])
+    assert envs.cartpole.name == "cartpole with pole.length=1.5"
+
+
 @pytest.mark.parametrize(
     ("arguments", "error", "message"),
     [
         ({"model": "nothing"}, ModelNotFoundError, "no model is called 'nothing'"),
         ({"integrator": "rk4"}, ConfigError, "available: gym, mujoco"),
         ({"render_mode": "human"}, ConfigError, "available: None, 'rgb_array'"),
+        ({"render_mode": "depth"}, ConfigError, 'vectorization_mode="sync"'),
+        (
+            {"edits": [{"pole.length": 1.0}, {}]},
+            ConfigError,
+            "one mapping.*not {'pole.length': 1.0}",
+        ),
+        ({"edits": 5}, ConfigError, "one mapping.*not 5"),
         ({"num_envs": 0}, ConfigError, "num_envs 0 makes no sense"),
         ({"num_envs": 2.0}, ConfigError, "num_envs 2.0 makes no sense"),
         ({"max_episode_steps": 0}, ConfigError, "max_episode_steps 0 makes no sense"),
@@ -440,11 +554,12 @@ def test_gymnasiums_statistics_count_the_same(n):
     assert found[0] == found[1]
 
 
-def test_one_picture_per_environment():
-    envs = gymnasium.make_vec(ENV_ID, num_envs=2, render_mode="rgb_array", width=160, height=120)
+@pytest.mark.parametrize("mode", ["rgb_array", "rgb_array_list"])
+def test_one_picture_per_environment(mode):
+    envs = gymnasium.make_vec(ENV_ID, num_envs=2, render_mode=mode, width=160, height=120)
     assert envs.render() is None
     envs.reset(seed=0)
-    envs.unwrapped.state = [(0.0, 0.0, 0.0, 0.0), (1.0, 0.0, 0.1, 0.0)]
+    envs.unwrapped.state = [(0.0, 1.0), (0.0, 0.0), (0.0, 0.1), (0.0, 0.0)]
     left, right = envs.render()
     single = CartPoleEnv(render_mode="rgb_array", width=160, height=120)
     single.state = (1.0, 0.0, 0.1, 0.0)

@@ -3,6 +3,7 @@
 import copy
 import doctest
 import itertools
+import time
 
 import gymnasium
 import numpy as np
@@ -226,3 +227,30 @@ def test_the_article_with_its_terminal_step_learns_more_than_without():
         for preset in ("article", "article-terminal")
     }
     assert means["article-terminal"] > means["article"] > 50
+
+
+def test_what_a_notebook_shows_is_short():
+    config = TrainConfig(backend="gym", episodes=300, bins=(1, 3, 6, 9))
+    result = train(config)
+    assert repr(config) == "TrainConfig(backend='gym', episodes=300, bins=(1, 3, 6, 9))"
+    assert eval(repr(config)) == config
+    assert repr(result.policy) == "Policy(bins=(1, 3, 6, 9), 162 states)"
+    mean = result.returns.mean()
+    assert repr(result.episodes) == f"EpisodeLog(300 episodes, mean return {mean:.2f})"
+    assert repr(result) == f"TrainResult({config!r}, {result.episodes!r}, {result.policy!r})"
+    untrained = Training(config)
+    for shown in (untrained.snapshot(), untrained.result(), result.episodes.columns):
+        assert len(repr(shown)) < 200
+
+
+def test_the_clock_starts_when_the_loop_is_compiled(monkeypatch):
+    training_ = Training(TrainConfig(backend="gym", episodes=2))
+    compile_it = training_._loop.compile
+
+    def slowly(*arguments):
+        compile_it(*arguments)
+        time.sleep(0.5)
+
+    monkeypatch.setattr(training_._loop, "compile", slowly)
+    assert list(training_.run())[-1] == 2
+    assert training_.result().seconds < 0.5

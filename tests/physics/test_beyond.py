@@ -6,7 +6,16 @@ import mujoco
 import numpy as np
 import pytest
 
-from mjcartpole.physics.beyond import beyond_equations, beyond_step, overridden_masses
+from mjcartpole.physics.beyond import (
+    beyond_equations,
+    beyond_step,
+    differs_from,
+    idle_numbers,
+    overridden_masses,
+)
+from mjcartpole.physics.equations import step
+from mjcartpole.physics.file_steps import method_of
+from mjcartpole.physics.free_region import free_region
 from mjcartpole.physics.model import load_model
 from mjcartpole.physics.parameters import read_parameters
 from mjcartpole.physics.simulation import Simulation
@@ -61,68 +70,27 @@ def rigged(text):
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ([plus(SLIDER, 'range="-2.4 2.4"')], "limit of joint 'slider' at -2.4 and 2.4"),
-        ([plus(HINGE, 'frictionloss="0.1"')], "friction loss in joint 'hinge'"),
         ([(HINGE, '<joint stiffness="1"')], "spring (stiffness) in joint 1"),
         ([plus(HINGE, 'stiffness="0 1"')], "spring (stiffness) in joint 'hinge'"),
         (
             [plus(SLIDER, 'damping="0 1"')],
             "damping of joint 'slider' is not proportional to the velocity",
         ),
-        ([plus(CART, 'euler="0 0.1 0"')], "slide axis of joint 'slider' is tilted, not horizontal"),
-        ([plus(POLE, 'euler="0.1 0 0"')], "hinge axis of joint 'hinge' is tilted, not horizontal"),
-        (
-            [('axis="0 1 0"', 'axis="1 1 0"')],
-            "hinge axis of joint 'hinge' is not perpendicular to the slide axis of joint 'slider'",
-        ),
-        (
-            [('pos="0 0 0.5" mass', 'pos="0.01 0 0.5" mass')],
-            "the pole's centre of mass is 0.01 m beside joint 'hinge' at angle 0",
-        ),
-        (
-            [plus(HINGE, 'ref="0.1"')],
-            "the pole's centre of mass is 0.0499 m beside joint 'hinge' at angle 0"
-            " (its ref is 0.1 rad)",
-        ),
-        ([("0 0 -9.8", "1 0 -9.8")], "gravity is not vertical (1 0 -9.8)"),
         ([plus(CART, 'gravcomp="1"')], "gravity compensation of body 'cart'"),
         (
             [plus(OPTION, 'density="1.2" wind="1 0 0"')],
             "a fluid around it (option density 1.2 and wind)",
         ),
         ([plus(OPTION, 'viscosity="0.1"')], "a fluid around it (option viscosity 0.1)"),
-        ([flag('gravity="disable"')], "gravity is switched off (option flag)"),
-        ([flag('actuation="disable"')], "actuation is switched off (option flag)"),
-        (
-            [flag('damper="disable"'), plus(HINGE, 'damping="1"')],
-            "damping is switched off (option flag)",
-        ),
         ([flag('sleep="enable"')], "sleeping of what is at rest (option flag)"),
         (
             [('<motor (.*?) gear="10"', r'<position \1 kp="10"')],
-            "bias (servo, velocity feedback) of actuator 'push'",
-        ),
-        (
-            [('<motor (.*?) gear="10"', r'<general \1 gaintype="affine"')],
-            "gain of actuator 'push' is not fixed",
+            "spring (a servo's feedback of the position) of actuator 'push'",
         ),
         ([plus(MOTOR, 'delay="0.04" nsample="3"')], "delay of actuator 'push'"),
-        ([plus(MOTOR, 'forcerange="-1 0.5"')], "force range of actuator 'push' clips its force"),
-        (
-            [plus(SLIDER, 'actuatorfrcrange="-9 10"')],
-            "actuator force range of joint 'slider' clips the force of actuator 'push'",
-        ),
-        (
-            [plus(MOTOR, 'group="3"'), plus(OPTION, 'actuatorgroupdisable="3"')],
-            "actuator 'push' is in a disabled group",
-        ),
         (
             [inside("<worldbody", GROUND), inside(CART, BALL)],
             "contact between geoms 'ground' and 'ball'",
-        ),
-        (
-            [("</worldbody>", '</worldbody><contact><pair geom1="cart" geom2="floor"/></contact>')],
-            "contact between geoms 'floor' and 'cart'",
         ),
         (rigged(STRING.format(' stiffness="2"')), "tendon 'string'"),
         (
@@ -135,6 +103,70 @@ def test_what_the_equations_leave_out_is_named(changes, said):
     cartpole = changed(*changes)
     assert beyond_equations(cartpole) == [said]
     assert read_parameters(cartpole).pole_mass > 0
+
+
+WHAT_ACTS_UNSEEN = '<dcmotor {} input="none" motorconst="0.05" resistance="1"/>'
+
+
+@pytest.mark.parametrize("place", [r"(</actuator>)", r"(<actuator>)"])
+@pytest.mark.parametrize(("joint", "unit"), [("hinge", "N m"), ("slider", "N")])
+def test_an_actuator_without_input_is_seen_by_its_force(place, joint, unit):
+    brake = WHAT_ACTS_UNSEEN.format(f'name="brake" joint="{joint}"')
+    whole = rf"{brake}\1" if "/" in place else rf"\1{brake}"
+    cartpole = changed((place, whole))
+    (said,) = beyond_equations(cartpole)
+    assert re.fullmatch(
+        rf"actuator force by actuator 'brake' on joint '{joint}' that the equations do not have "
+        rf"\(up to \S+ {unit}\)",
+        said,
+    )
+    assert cartpole.controls == (-1.0, 1.0)
+    assert read_parameters(cartpole).forces == (-10.0, 10.0)
+
+
+def test_a_force_of_a_kind_that_nobody_listed_is_seen(monkeypatch):
+    """Whatever the names know: here they know nothing."""
+    monkeypatch.setattr("mjcartpole.physics.beyond._surroundings", lambda cartpole: [])
+    thick = changed(plus(OPTION, 'viscosity="0.1"'))
+    (said,) = beyond_equations(thick)
+    assert said.startswith("fluid force on joint 'slider' that the equations do not have")
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        [plus(SLIDER, 'range="-1 1"')],
+        [plus(SLIDER, 'range="-1 1"'), flag('limit="disable"')],
+        [plus(HINGE, 'frictionloss="0.1"')],
+        [plus(CART, 'euler="0 0.1 0"')],
+        [plus(POLE, 'euler="0.1 0 0"')],
+        [('axis="0 1 0"', 'axis="0.3 1 0"')],
+        [('axis="0 1 0"', 'axis="0.3 1 0.2"'), ("0 0 -9.8", "1 0.4 -9.8")],
+        [('pos="0 0 0.5" mass', 'pos="0.01 0 0.5" mass')],
+        [plus(HINGE, 'ref="0.1"')],
+        [("0 0 -9.8", "1 0 -9.8")],
+        [flag('gravity="disable"')],
+        [flag('actuation="disable"')],
+        [flag('damper="disable"'), plus(HINGE, 'damping="1"')],
+        [('<motor (.*?) gear="10"', r'<general \1 gaintype="affine"')],
+        [('<motor (.*?) gear="10"', r'<velocity \1 kv="3"')],
+        [plus(MOTOR, 'forcerange="-1 0.5"')],
+        [plus(SLIDER, 'actuatorfrcrange="-9 10"')],
+        [plus(MOTOR, 'group="3"'), plus(OPTION, 'actuatorgroupdisable="3"')],
+        [("</worldbody>", '</worldbody><contact><pair geom1="cart" geom2="floor"/></contact>')],
+    ],
+)
+def test_what_the_equations_cover_moves_as_they_say(changes):
+    cartpole = changed(*changes)
+    assert beyond_equations(cartpole) == []
+    p, region = read_parameters(cartpole), free_region(cartpole).within((-2, 2), (-0.2, 0.2))
+    rng, simulation = np.random.default_rng(0), Simulation(cartpole)
+    for _ in range(20):
+        state = [rng.uniform(*region.x), rng.normal(), rng.uniform(*region.theta), rng.normal()]
+        simulation.state, action = state, int(rng.integers(2))
+        expected = step(p, state, p.forces[action])
+        found = simulation.step(cartpole.controls[action])
+        np.testing.assert_allclose(found, expected, rtol=1e-13, atol=1e-13)
 
 
 @pytest.mark.parametrize(
@@ -164,7 +196,12 @@ def test_what_cannot_act_is_not_listed(changes):
 
 def test_several_things_are_all_named():
     cartpole = changed(plus(SLIDER, 'range="-1 1"'), plus(HINGE, 'range="-1 1" stiffness="1"'))
-    assert len(beyond_equations(cartpole)) == 3
+    assert beyond_equations(cartpole) == ["spring (stiffness) in joint 'hinge'"]
+    assert differs_from(cartpole) == [
+        "limit of joint 'slider' at -1 and 1",
+        "limit of joint 'hinge' at -1 and 1",
+        "spring (stiffness) in joint 'hinge'",
+    ]
 
 
 @pytest.mark.parametrize("seed", range(12))
@@ -213,7 +250,28 @@ def test_steps_that_are_not_eulers_are_named():
     assert beyond_step(changed(('"Euler"', '"implicitfast"'))) == []
     assert beyond_step(changed(flag('eulerdamp="disable"'))) == []
     damped = changed(flag('eulerdamp="disable"'), plus(HINGE, 'damping="1"'))
-    assert beyond_step(damped) == ["implicit damping (eulerdamp) switched off"]
+    assert beyond_step(damped) == ["integrator Euler without eulerdamp instead of Euler"]
+    assert beyond_step(damped, method_of(damped)) == []
+    rubbing = changed(('"Euler"', '"discrete"'), plus(HINGE, 'frictionloss="1"'))
+    assert beyond_step(rubbing, method_of(rubbing)) == [
+        "friction that the integrator discrete solves in its own way"
+    ]
+
+
+def test_numbers_that_no_episode_feels():
+    assert idle_numbers(load_model()) == []
+    unfelt = changed(
+        plus(SLIDER, 'range="-2.4 3"'),
+        plus(HINGE, 'damping="1"'),
+        flag('damper="disable" gravity="disable"'),
+    )
+    assert idle_numbers(unfelt) == [
+        "limit of joint 'slider' at -2.4 and 3",
+        "damping of joint 'hinge', switched off by an option flag",
+        "gravity, switched off by an option flag",
+    ]
+    assert differs_from(unfelt) == ["gravity 0 instead of 9.8"]
+    assert idle_numbers(changed(plus(SLIDER, 'range="-1 1"'))) == []
 
 
 def test_a_mass_that_an_inertial_overrides_is_named():

@@ -59,7 +59,7 @@ def test_y_up_and_no_names():
         "joint 1 (unnamed) of body 2 (unnamed)",
     )
     assert (found.up, found.poles[0].leans, found.forces) == ("+y", -1, (-10.0, 10.0))
-    assert not found.equations_apply
+    assert found.equations_apply
 
 
 @pytest.mark.parametrize(
@@ -76,8 +76,12 @@ def test_y_up_and_no_names():
             ('<motor name="push" joint="slider" gear="10"', '<position joint="slider" kp="7"'),
             "action 0: -7 N, action 1: 7 N at rest at x = 0, by a servo (control -1 or 1, gear 1)",
         ),
-        (('"Euler"', '"RK4"'), "apply to the accelerations, not to a step: integrator RK4"),
-        (('name="hinge"', 'name="hinge" frictionloss="1"'), "do not apply: friction loss in joint"),
+        (('"Euler"', '"RK4"'), "equations   apply"),
+        (
+            ('name="hinge"', 'name="hinge" stiffness="1"'),
+            "do not apply: spring (stiffness) in joint",
+        ),
+        (('name="hinge"', 'name="hinge" frictionloss="1"'), "equations   apply"),
     ],
 )
 def test_what_a_change_is_said_to_change(change, line):

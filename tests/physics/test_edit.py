@@ -10,11 +10,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mjcartpole.errors import ConfigError, MjCartPoleError, ModelError, ModelSyntaxError
+from mjcartpole.physics.beyond import differs_from
 from mjcartpole.physics.edit import (
     EDIT_NAMES,
     check_key,
     describe_edits,
-    differs_from,
     edit_document,
     edits_of,
     parse_edit,
@@ -242,7 +242,7 @@ def test_differences_from_the_reference_are_named():
     assert differs_from(load_model(edit_document(REFERENCE, edits))) == [
         "pole mass 0.2 instead of 0.1",
         "inertia 0.0166667 instead of 0.00833333",
-        "friction loss in joint 'slider'",
+        "friction loss 1 instead of 0 in joint 'slider'",
         "integrator RK4 instead of Euler",
     ]
 

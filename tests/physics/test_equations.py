@@ -18,12 +18,9 @@ from mjcartpole.physics.equations import (
     coefficients,
     derivative,
     energy,
-    linearisation,
     rk4_step,
     solve,
-    spectral_radius,
     step,
-    step_matrix,
     uniform_rod,
 )
 
@@ -205,52 +202,6 @@ def test_energy_of_a_known_state():
     assert energy(CARTPOLE_V1, [5.0, 1.0, np.pi / 2, 0.0]) == pytest.approx(0.55)
 
 
-# --- linearisation ------------------------------------------------------------------------------
-
-
-def jacobian(function, size=4, h=1e-30):
-    """By complex steps: column j is what coordinate j does."""
-    return np.stack([function(1j * h * np.eye(size)[j]).imag / h for j in range(size)], axis=-1)
-
-
-@pytest.mark.parametrize("p", [CARTPOLE_V1, DAMPED], ids=["CartPole-v1", "damped"])
-def test_the_linearisation_is_the_derivatives_jacobian(p):
-    a, b = linearisation(p)
-    assert (a.shape, b.shape) == ((4, 4), (4, 1))
-    expected = jacobian(lambda state: derivative(p, state, 0.0))
-    np.testing.assert_allclose(a, expected, rtol=1e-14, atol=1e-14)
-    slope = derivative(p, np.zeros(4), 1e-30j).imag / 1e-30
-    np.testing.assert_allclose(b[:, 0], slope, rtol=1e-14, atol=1e-14)
-
-
-@pytest.mark.parametrize("integrator", ["gym", "mujoco"])
-@pytest.mark.parametrize("h", [None, 0.1])
-@pytest.mark.parametrize("p", [CARTPOLE_V1, DAMPED], ids=["CartPole-v1", "damped"])
-def test_the_step_matrix_is_the_steps_jacobian(p, integrator, h):
-    expected = jacobian(lambda state: step(p, state, 0.0, integrator, h))
-    np.testing.assert_allclose(step_matrix(p, integrator, h), expected, rtol=1e-14, atol=1e-14)
-
-
-def test_the_spectral_radius_of_cartpole_v1():
-    # theta_acc = omega^2 theta with omega^2 = g / (l (4/3 - m / (M + m))): Euler grows by
-    # 1 + h omega, the semi-implicit method by the larger root of z^2 - (2 + h^2 omega^2) z + 1.
-    h_omega = 0.02 * np.sqrt(9.8 / (0.5 * (4 / 3 - 0.1 / 1.1)))
-    assert spectral_radius(CARTPOLE_V1, "gym") == pytest.approx(1 + h_omega, rel=1e-12)
-    half = 1 + h_omega**2 / 2
-    root = half + np.sqrt(half**2 - 1)
-    assert spectral_radius(CARTPOLE_V1, "mujoco") == pytest.approx(root, rel=1e-12)
-    assert spectral_radius(CARTPOLE_V1, "gym", 0.001) < spectral_radius(CARTPOLE_V1, "gym")
-
-
-def test_the_spectral_radius_foretells_how_errors_grow():
-    zero, small = np.zeros(4), np.array([0.0, 0.0, 1e-12, 0.0])
-    for _ in range(150):
-        zero, last = step(CARTPOLE_V1, zero, 0.0), small
-        small = step(CARTPOLE_V1, small, 0.0)
-    assert small[2] / last[2] == pytest.approx(spectral_radius(CARTPOLE_V1), rel=1e-6)
-    assert not zero.any()
-
-
 # --- steps --------------------------------------------------------------------------------------
 
 
@@ -335,5 +286,3 @@ def test_a_state_has_four_values_and_an_integrator_exists():
         step(CARTPOLE_V1, np.zeros(3), 0.0)
     with pytest.raises(ConfigError, match="'rk4' is unknown"):
         step(CARTPOLE_V1, np.zeros(4), 0.0, "rk4")
-    with pytest.raises(ConfigError, match="'rk4' is unknown"):
-        spectral_radius(CARTPOLE_V1, "rk4")

@@ -8,7 +8,12 @@ import mujoco
 import numpy as np
 import pytest
 
-from mjcartpole.errors import ModelNotFoundError, ModelSyntaxError, NotACartPoleError
+from mjcartpole.errors import (
+    ConfigError,
+    ModelNotFoundError,
+    ModelSyntaxError,
+    NotACartPoleError,
+)
 from mjcartpole.physics.model import (
     INTEGRATORS,
     load_model,
@@ -242,7 +247,8 @@ def test_comments_as_people_write_them_are_taken():
 
 
 def test_integrators_are_numbered_as_in_mujoco():
-    for number, name in enumerate(INTEGRATORS):
+    assert len(INTEGRATORS) == len(mujoco.mjtIntegrator.__members__)
+    for number, name in INTEGRATORS.items():
         assert mujoco.mjtIntegrator(number).name == f"mjINT_{name.upper()}"
         cartpole = load_model(changed('integrator="Euler"', f'integrator="{name}"'))
         assert cartpole.integrator == name
@@ -254,6 +260,26 @@ def test_the_files_own_timestep_on_request():
     cartpole = load_model(text, own_timestep=True)
     assert (cartpole.substeps, cartpole.timestep) == (1, 0.013)
     assert load_model(cartpole) is cartpole
+
+
+@pytest.mark.parametrize("timestep", [0.02, 0.005])
+def test_a_loaded_model_may_be_given_its_own_timestep(timestep):
+    cartpole = load_model(changed('timestep="0.02"', f'timestep="{timestep}"'))
+    assert cartpole.substeps == round(0.02 / timestep)
+    own = load_model(cartpole, own_timestep=True)
+    assert (own.substeps, own.control_step) == (1, timestep)
+    assert own.has_own_timestep == (timestep != 0.02)
+    assert not cartpole.has_own_timestep
+
+
+def test_edits_are_refused_where_the_document_is_not_the_model():
+    cartpole = load_model("cartpole")
+    cartpole.model.opt.gravity[2] = -1.0
+    with pytest.raises(ConfigError, match="compiles to another model"):
+        load_model(cartpole, {"pole.length": 2})
+    spec = mujoco.MjSpec.from_string(REFERENCE)
+    by_spec = load_model(spec, {"pole.length": 2}).model
+    assert same_model(by_spec, load_model("cartpole", {"pole.length": 2}).model)
 
 
 def test_options_are_changed_in_a_copy():
@@ -269,3 +295,9 @@ def test_a_file_may_have_any_ending_but_a_shipped_name_comes_first(tmp_path, mon
         (tmp_path / name).write_text(changed("-9.8", "-1.62"), encoding="utf-8")
     assert load_model("mine.mjcf").model.opt.gravity[2] == -1.62
     assert load_model("cartpole").model.opt.gravity[2] == -9.8
+
+
+def test_what_a_notebook_shows_is_short():
+    assert repr(load_model("twopoles")) == "CartPole('twopoles', 2 poles, timestep 0.02 s)"
+    edited = load_model("cartpole", {"pole.length": 1.5})
+    assert repr(edited) == "CartPole('cartpole with pole.length=1.5', 1 pole, timestep 0.02 s)"

@@ -1,5 +1,7 @@
 """One control step, against known answers and against MuJoCo itself."""
 
+import copy
+import pickle
 import re
 
 import mujoco
@@ -226,3 +228,21 @@ def _assert_same_motion(model, stepped):
         mujoco.mj_step(stepped, other)
         np.testing.assert_array_equal(one.qpos, other.qpos)
         np.testing.assert_array_equal(one.qvel, other.qvel)
+
+
+@pytest.mark.parametrize("integrator", ["gym", "mujoco"])
+@pytest.mark.parametrize("name", ["cartpole", "twopoles", "friction", "stops"])
+@pytest.mark.parametrize(
+    "copied", [copy.copy, copy.deepcopy, lambda simulation: pickle.loads(pickle.dumps(simulation))]
+)
+def test_a_copy_goes_on_bit_equal_and_alone(name, integrator, copied):
+    cartpole = load_model(name)
+    simulation = Simulation(cartpole, integrator)
+    simulation.put([0.1] * simulation.size)
+    for turn in range(40):
+        simulation.step(cartpole.controls[turn % 2])
+    simulation.model.opt.gravity[2] += 1.0
+    before, other = simulation.state, copied(simulation)
+    ahead = [other.step(cartpole.controls[turn % 3 == 0]) for turn in range(60)]
+    np.testing.assert_array_equal(simulation.state, before)
+    assert ahead == [simulation.step(cartpole.controls[turn % 3 == 0]) for turn in range(60)]

@@ -94,6 +94,6 @@ def test_results_that_a_kill_left_half_written_are_written_again(tmp_path):
 @pytest.mark.parametrize("engine", ["python", "compiled"])
 def test_a_policy_is_evaluated_where_it_was_trained(config, engine):
     result = train(config)
-    found = evaluate_where_trained(result, CARTPOLE, engine)
+    found = evaluate_where_trained(result.policy, result.config, CARTPOLE, engine)
     again = evaluate(result.policy, backend=config.backend, integrator=config.integrator)
     assert found == again

@@ -7,8 +7,10 @@ import pytest
 from mjcartpole.errors import FileError, RunError
 from mjcartpole.learning import folders, runs
 from mjcartpole.learning.config import TrainConfig
+from mjcartpole.learning.episodes import Episode
 from mjcartpole.physics.model import load_model, same_model
 from mjcartpole.studies import seed_runs
+from mjcartpole.studies.evaluation import Evaluation
 from mjcartpole.studies.seeds import Crew, ManyResult, SeedResult
 
 CONFIG = TrainConfig(episodes=5, backend="gym", seed=2)
@@ -31,6 +33,11 @@ def train_in(folder, seeds=2, config=CONFIG, **options):
     return crew.result()
 
 
+def evaluation_of(*returns):
+    episodes = [Episode(n, float(one), one, "pole fell") for n, one in enumerate(returns)]
+    return Evaluation("gym", 0, tuple(episodes))
+
+
 def names(folder):
     return sorted(path.name for path in folder.iterdir() if path.name != "versions.json")
 
@@ -43,7 +50,29 @@ def test_what_many_seeds_leave(tmp_path):
         assert runs.is_complete(folder)
         run = runs.load_run(folder)
         assert (run.config, run.preset) == (found.result.config, "article")
-        assert runs.read_summary(folder)["evaluation"] == found.evaluation
+        assert runs.read_summary(folder)["evaluation"] == found.evaluation.summary()
+
+
+def test_a_seed_that_is_complete_on_disk_has_the_same_evaluation(tmp_path):
+    first = train_in(tmp_path / "many")
+    again = Crew(CONFIG, 2, load_model(), folder=tmp_path / "many", preset="article")
+    for _ in again.run(lambda: False):
+        pass
+    evaluations = [[found.evaluation for found in many.seeds] for many in (first, again.result())]
+    assert evaluations[0] == evaluations[1]
+    assert evaluations[0][0].endings.keys() == {"time limit", "off the track", "pole fell"}
+
+
+def test_seeds_without_a_policy_are_told_apart(tmp_path):
+    folder = tmp_path / "many"
+    train_in(folder)
+    assert not seed_runs.is_seeds(folder / "seed-2")
+    assert seed_runs.learned_seeds(folder) == ({2: folder / "seed-2", 3: folder / "seed-3"}, [])
+    (folder / "seed-2" / "policy.json").unlink()
+    assert seed_runs.learned_seeds(folder) == ({3: folder / "seed-3"}, [2])
+    (folder / "seed-3" / "policy.json").unlink()
+    with pytest.raises(RunError, match="train --resume"):
+        seed_runs.learned_seeds(folder)
 
 
 def test_what_was_begun_comes_back(tmp_path):
@@ -61,10 +90,10 @@ def test_the_table_and_the_figures(tmp_path):
     many = ManyResult(
         CONFIG,
         (
-            SeedResult(2, {"mean": 480.5, "minimum": 300.0}),
+            SeedResult(2, evaluation_of(661, 300)),
             SeedResult(3, error="it fell, over"),
             SeedResult(4),
-            SeedResult(5, {"mean": 100.0, "minimum": 9.0}),
+            SeedResult(5, evaluation_of(191, 9)),
         ),
     )
     seed_runs.write_seeds(tmp_path, many)

@@ -8,10 +8,11 @@ import pytest
 from mjcartpole.errors import ConfigError, ModelError
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.training import train
+from mjcartpole.physics.batch_simulation import available_cores
 from mjcartpole.physics.model import load_model
 from mjcartpole.studies.evaluation import evaluate
 from mjcartpole.studies.many import train_many
-from mjcartpole.studies.seeds import Crew, available_cores
+from mjcartpole.studies.seeds import Crew, ManyResult, SeedResult
 
 CONFIG = TrainConfig(episodes=15, backend="gym", seed=4)
 
@@ -26,7 +27,7 @@ def assert_as_alone(many, config):
         played = evaluate(
             alone.policy, backend=config.backend, model=config.model, integrator=config.integrator
         )
-        assert found.evaluation == played.summary()
+        assert found.evaluation == played
         assert found.score == played.returns.mean()
 
 
@@ -58,7 +59,7 @@ def test_seeds_are_taken_as_they_are_given():
 
 def test_the_figures_are_those_of_the_scores():
     many = train_many(CONFIG, 5)
-    scores = [found.evaluation["mean"] for found in many.seeds]
+    scores = [found.evaluation.mean for found in many.seeds]
     assert many.scores == scores
     assert many.failed == []
     figures = many.aggregate()
@@ -142,3 +143,14 @@ def test_an_unknown_engine_or_model_is_refused_before_any_work():
 def test_no_more_workers_than_seeds():
     assert Crew(CONFIG, 2, load_model(), workers=9).workers == 2
     assert 1 <= Crew(CONFIG, 999, load_model()).workers == available_cores()
+
+
+def test_what_a_notebook_shows_is_short():
+    many = train_many(TrainConfig(backend="gym", episodes=5), seeds=3)
+    scores = many.scores
+    figures = f"mean {sum(scores) / 3:.2f}, least {min(scores):.2f}"
+    assert repr(many) == f"ManyResult(3 of 3 seeds evaluated, {figures})"
+    assert repr(many.seeds[1]) == f"SeedResult(1: {many.seeds[1].evaluation!r})"
+    assert repr(SeedResult(7, error="it fell")) == "SeedResult(7: it fell)"
+    nothing = ManyResult(many.config, (SeedResult(7),))
+    assert repr(nothing) == "ManyResult(0 of 1 seeds evaluated)"

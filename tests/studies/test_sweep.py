@@ -146,3 +146,9 @@ def test_one_thing_is_not_set_and_swept():
 
 def test_doctests():
     assert doctest.testmod(module).failed == 0
+
+
+def test_what_a_notebook_shows_is_short():
+    swept = sweep(POLICY, "cartpole", "gravity", [9.0, 9.5, 10.0], episodes=1, seed=4)
+    played = "TransferResult(policies: 1, models: 3, seed 4)"
+    assert repr(swept) == f"SweepResult(gravity from 9 to 10 on cartpole, values: 3, {played})"

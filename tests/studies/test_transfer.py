@@ -138,3 +138,23 @@ def test_a_simulation_that_diverges_fails_its_cell_alone():
     assert np.isnan(result.means[:, 0]).all()
     assert np.isfinite(result.means[:, 1]).all()
     json.dumps(result.summary(), allow_nan=False)
+
+
+def test_a_learner_of_several_seeds_is_the_mean_over_them():
+    group = [POLICIES["steady"], POLICIES["clumsy"]]
+    mixed = transfer({"both": group, **POLICIES}, ["long", "gym"], episodes=8, seed=5)
+    for both, *alone in zip(*mixed.rows, strict=True):
+        assert both.mean == pytest.approx(np.mean([cell.mean for cell in alone]))
+        assert both.evaluation.minimum == min(cell.evaluation.minimum for cell in alone)
+        assert len(both.evaluation.episodes) == 16
+        means = sorted(cell.mean for cell in alone)
+        assert both.interval == pytest.approx(tuple(means))
+    with pytest.raises(ConfigError, match="poles"):
+        transfer({"both": [POLICIES["steady"], POLICIES["clumsy"]]}, ["twopoles"], episodes=1)
+
+
+def test_what_a_notebook_shows_is_short(matrix):
+    assert repr(matrix) == "TransferResult(policies: 2, models: 3, seed 5)"
+    for shown in (matrix.cells[0], matrix.cells[0].evaluation, find_place("long")):
+        assert len(repr(shown)) < 250
+        assert "\n" not in repr(shown)

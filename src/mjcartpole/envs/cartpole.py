@@ -1,39 +1,39 @@
 """CartPole-v1 with MuJoCo underneath, as a `gymnasium.Env`."""
 
+import copy
 import functools
 from collections.abc import Callable
-from typing import Any, Literal, get_args
+from typing import Any, Self
 
 import gymnasium
 import numpy as np
 import numpy.typing as npt
 from gymnasium import logger, spaces
-from gymnasium.envs.classic_control.utils import maybe_parse_reset_bounds
+from gymnasium.envs.registration import EnvSpec
 
 from mjcartpole import task
+from mjcartpole.envs.editable import Editable
+from mjcartpole.envs.names import CartPoleNames, refuse_slip
+from mjcartpole.envs.options import USUAL, reset_options
+from mjcartpole.envs.pictures import Pictures, RenderMode
 from mjcartpole.envs.registration import ENV_ID
-from mjcartpole.errors import ConfigError, InvalidActionError, ResetNeededError
+from mjcartpole.envs.spec import portable
+from mjcartpole.errors import InvalidActionError, ResetNeededError
 from mjcartpole.integrator import Integrator
-from mjcartpole.media.renderer import DEFAULT_HEIGHT, DEFAULT_WIDTH, Renderer, open_renderer
-from mjcartpole.media.scene import DEFAULT_CAMERA, check_picture
-from mjcartpole.media.window import Window, open_window
-from mjcartpole.physics.model import Edits, ModelLike, load_model
+from mjcartpole.media.renderer import DEFAULT_HEIGHT, DEFAULT_WIDTH
+from mjcartpole.media.scene import DEFAULT_CAMERA
+from mjcartpole.physics.model import CartPole, Edits, ModelLike, load_shared
 from mjcartpole.physics.simulation import (
     FARTHEST_SANE,
     Simulation,
     State,
+    as_one_pole,
     check_sane,
 )
 
-RenderMode = Literal["human", "rgb_array"]
-
 # What `step` needs, as plain globals: the fewest look-ups and no sign to change.
 _INT64 = np.int64
-_X_MIN, _X_MAX = -task.X_LIMIT, task.X_LIMIT
 _FARTHEST = FARTHEST_SANE
-_THETA_MIN, _THETA_MAX = -task.THETA_LIMIT, task.THETA_LIMIT
-
-_DEFAULT_PICTURE = {"width": DEFAULT_WIDTH, "height": DEFAULT_HEIGHT, "camera": DEFAULT_CAMERA}
 
 _STEP_AFTER_END = (
     "You are calling 'step()' even though this environment has already returned "
@@ -42,7 +42,15 @@ _STEP_AFTER_END = (
 )
 
 
-class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int]):
+_WIRES = ("_move", "_advance", "_at_hand")
+"""What a copy makes anew: functions and views that hold on to one simulation."""
+
+
+_OWN = ("_simulation", "_pictures", "_model", "_steps_after_end")
+"""What even a shallow copy has for itself."""
+
+
+class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int], CartPoleNames):
     """CartPole-v1, moved by MuJoCo.
 
     ## Description
@@ -99,7 +107,8 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int]):
     ## Starting State
 
     Each of the values is drawn uniformly from (-0.05, 0.05) in the order x, x_dot, theta,
-    theta_dot; `reset(options={"low": ..., "high": ...})` draws from other bounds.
+    theta_dot; `reset(options={"low": ..., "high": ...})` draws from other bounds, and
+    `reset(options={"edits": {"pole.length": 1.5}})` edits the model, each until the next reset.
 
     ## Episode End
 
@@ -123,7 +132,12 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int]):
     | `width`, `height`     | int                    | 640, 480    | Size of a picture, in pixels  |
     | `camera`              | str                    | "side"      | A camera of the model         |
 
-    `env.unwrapped.state` reads and sets the float64 state.
+    `env.unwrapped.state` reads and sets the float64 state. What `CartPole-v1` has as attributes is
+    there too: `gravity`, `masscart`, `masspole`, `length` (half the pole's), `force_mag`, `tau`,
+    `kinematics_integrator`, and `total_mass` and `polemass_length`, which follow from these.
+    Reading them says what the model has; setting one edits the model's document, with effect from
+    the next reset. `x_threshold` and `theta_threshold_radians` hold from the next step; pictures
+    keep showing CartPole-v1's.
 
     >>> env.unwrapped.state = (0.0, 0.0, 0.1, 0.0)
     >>> [round(float(value), 4) for value in env.step(1)[0]]
@@ -134,6 +148,8 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int]):
 
     * v1: the rules of CartPole-v1.
     """  # noqa: E501 - a table's rows cannot be wrapped
+
+    _spec: EnvSpec | None = None
 
     metadata: dict[str, Any] = {  # noqa: RUF012 - gymnasium's own declaration
         "render_modes": ["human", "rgb_array"],
@@ -161,38 +177,95 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int]):
                 size.
             RenderError: The size of a picture makes no sense, or the model has no such camera.
         """
-        _check_render_mode(render_mode, width, height)
-        cartpole = load_model(model, edits, own_timestep=own_timestep)
-        self.simulation, poles = Simulation(cartpole, integrator), cartpole.poles
-        self.metadata = self.metadata | {"render_fps": task.frame_rate(cartpole.control_step)}
-        bound = task.observation_bound(poles)
-        self.observation_space = spaces.Box(-bound, bound, dtype=np.float32)
+        cartpole = load_shared(model, edits, own_timestep=own_timestep)
+        self._model = Editable(cartpole, integrator)
+        # Made when it is first needed: it takes several times as long as all the rest.
+        self._simulation: Simulation | None = None
+        self._set_limits(task.X_LIMIT, task.THETA_LIMIT)
         self.action_space = spaces.Discrete(task.N_ACTIONS)
         self.render_mode = render_mode
-        step = self.simulation.step
-        self._move: Callable[[float], State] = step if poles == 1 else _as_one_pole(step)
-        self._advance: Callable[[float], State] = _needs_reset
-        self._left, self._right = self.simulation.cartpole.controls
         self._step_reward, self._end_reward, self._late_reward = (
             task.reward(terminated=over, already_over=late, sutton_barto=sutton_barto_reward)
             for over, late in ((False, False), (True, False), (True, True))
         )
-        self._steps_after_end: int | None = None
+        self._pictures = Pictures(cartpole, render_mode, width, height, camera)
+        self._advance: Callable[[float], State] = _needs_reset
+        self._steps_after_end: list[int | None] = [None]
+        self._left, self._right = cartpole.controls
+        self._set_frame_rate(cartpole)
+
+    def _set_frame_rate(self, cartpole: CartPole) -> None:
+        self.metadata = self.metadata | {"render_fps": task.frame_rate(cartpole.control_step)}
+
+    @property
+    def simulation(self) -> Simulation:
+        """The physics: MuJoCo's model and data, and the cart-pole that they are of."""
+        return self._begin() if self._simulation is None else self._simulation
+
+    @simulation.setter
+    def simulation(self, simulation: Simulation) -> None:
+        self._simulation, self._model.is_stale = simulation, False
+        self._wire(simulation)
+
+    def _begin(self, edits: Edits = None) -> Simulation:
+        """Simulate the model as it is now, with edits that last one episode."""
+        before, simulation = self._simulation, self._model.begin(edits)
+        self._simulation = simulation
+        self._wire(simulation)
+        self._pictures.close()
+        if before and before.cartpole.control_step != simulation.cartpole.control_step:
+            self._set_frame_rate(simulation.cartpole)
+        return simulation
+
+    def _wire(self, simulation: Simulation) -> None:
+        """Keep what `step` needs of a simulation at hand."""
+        poles = simulation.cartpole.poles
+        self._move: Callable[[float], State] = (
+            simulation.step if poles == 1 else as_one_pole(simulation.step)
+        )
+        self._left, self._right = simulation.cartpole.controls
         observation = np.zeros(4, dtype=np.float32)
         # A view that takes single floats several times faster than the array does.
-        self._cells: memoryview[float] = observation.data.cast("B").cast("f")
-        self._new_observation = (
-            observation.copy if poles == 1 else functools.partial(_observe, self.simulation)
-        )
-        picture = {"width": width, "height": height, "camera": camera}
-        if render_mode == "rgb_array" or picture != _DEFAULT_PICTURE:
-            check_picture(self.simulation.cartpole, width, height, camera)
-        self._open_renderer = functools.partial(
-            open_renderer, self.simulation.cartpole, width=width, height=height, camera=camera
-        )
-        self._open_window = functools.partial(open_window, self.simulation.cartpole, camera)
-        self._renderer: Renderer | None = None
-        self._window: Window | None = None
+        cells: memoryview[float] = observation.data.cast("B").cast("f")
+        observe = observation.copy if poles == 1 else functools.partial(_observe, simulation)
+        self._at_hand = (*self._limits, cells, observe, self._step_reward)
+
+    def _set_limits(self, x: float, theta: float) -> None:
+        super()._set_limits(x, theta)
+        if self._simulation is not None:
+            self._wire(self._simulation)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """All that a copy needs to go on bit-equal; it opens a renderer of its own."""
+        kept = {name: value for name, value in self.__dict__.items() if name not in _WIRES}
+        return kept | {"_advance": self._advance is not _needs_reset}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        if self._simulation is not None:
+            self._wire(self._simulation)
+        self._advance = self._move if state["_advance"] else _needs_reset
+
+    def __copy__(self) -> Self:
+        """A copy with a simulation and pictures of its own; all else is shared with it."""
+        own = {name: copy.copy(getattr(self, name)) for name in _OWN}
+        copied = type(self).__new__(type(self))
+        copied.__setstate__(self.__getstate__() | own)
+        return copied
+
+    def __setattr__(self, name: str, value: object) -> None:
+        if name[0] != "_" and type(self) is CartPoleEnv and not _is_known(name):
+            refuse_slip(name)
+        super().__setattr__(name, value)
+
+    @property
+    def spec(self) -> EnvSpec | None:
+        """Gymnasium's specification; it says in JSON what makes the same environment again."""
+        return self._spec
+
+    @spec.setter
+    def spec(self, spec: EnvSpec | None) -> None:
+        self._spec = spec and portable(spec, self._model.base)
 
     @property
     def state(self) -> npt.NDArray[np.float64] | None:
@@ -231,34 +304,35 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int]):
             raise _invalid(action)
         advance = self._advance
         x, x_dot, theta, theta_dot = advance(control)
+        x_min, x_max, theta_min, theta_max, cells, observe, reward = self._at_hand
         if (
-            _X_MIN <= x <= _X_MAX
-            and _THETA_MIN <= theta <= _THETA_MAX
+            x_min <= x <= x_max
+            and theta_min <= theta <= theta_max
             # Neither velocity is NaN, or so large that the physics have diverged.
             and -_FARTHEST < x_dot - theta_dot < _FARTHEST
         ):
-            terminated, reward = False, self._step_reward
+            terminated = False
         else:
             terminated, reward = True, self._end()
         # None is told apart sooner than a word is.
         if self.render_mode is not None and self.render_mode == "human":
             self.render()
-        cells, new_observation = self._cells, self._new_observation
         cells[0] = x
         cells[1] = x_dot
         cells[2] = theta
         cells[3] = theta_dot
-        return new_observation(), reward, terminated, False, {}
+        return observe(), reward, terminated, False, {}
 
     def _end(self) -> float:
         """Reward of a step that ends the episode, or comes after its end."""
         check_sane(tuple(self.simulation.state.tolist()), self.simulation.cartpole.name)
-        if self._steps_after_end is None:
-            self._steps_after_end = 0
+        count = self._steps_after_end
+        if count[0] is None:
+            count[0] = 0
             return self._end_reward
-        if self._steps_after_end == 0:
+        if count[0] == 0:
             logger.warn(_STEP_AFTER_END)
-        self._steps_after_end += 1
+        count[0] += 1
         return self._late_reward
 
     def reset(
@@ -268,17 +342,25 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int]):
 
         Args:
             seed: Seeds the env's generator, as gymnasium describes.
-            options: `{"low": float, "high": float}`, bounds of the starting state.
+            options: `{"low": float, "high": float, "edits": …}`: bounds of the starting state and
+                edits of the model (see `load_model`), all of them until the next reset.
 
         Raises:
-            ValueError: A bound is no number, or low is above high.
+            ConfigError: There is no such option, a bound is no finite number, low is above high,
+                or an edit makes no sense; nothing has changed then.
+            ModelError: The edits make the model one that cannot be used.
         """
+        low, high, edits = USUAL if options is None else reset_options(options)
+        simulation = self._simulation
+        if simulation is None or self._model.is_stale or edits:
+            simulation = self._begin(edits)
         super().reset(seed=seed)
-        low, high = maybe_parse_reset_bounds(options, task.RESET_LOW, task.RESET_HIGH)
-        state = self.np_random.uniform(low=low, high=high, size=self.simulation.size)
-        self.simulation.put(state.tolist())
-        self._advance = self._move
-        self._steps_after_end = None
+        state = self.np_random.uniform(low=low, high=high, size=simulation.size)
+        simulation.put(state.tolist())
+        # Attributes are set where they change only: that takes as long as a step's arithmetic.
+        if self._advance is not self._move:
+            self._advance = self._move
+        self._steps_after_end[0] = None
         if self.render_mode == "human":
             self.render()
         return state.astype(np.float32), {}
@@ -303,52 +385,22 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int]):
         if self.state is None:
             return None
         if self.render_mode == "human":
-            if self._window is None:
-                self._window = self._open_window()
-            self._window.show(self.state)
+            self._pictures.show(self.simulation.cartpole, self.state)
             return None
-        if self._renderer is None:
-            self._renderer = self._open_renderer()
-        return self._renderer.render(self.state)
+        return self._pictures.draw(self.simulation.cartpole, self.state)
 
     def close(self) -> None:
         """Free the renderer and the window, if there are any."""
-        for picture in (self._renderer, self._window):
-            if picture is not None:
-                picture.close()
-        self._renderer = self._window = None
+        self._pictures.close()
 
 
-def _check_render_mode(render_mode: str | None, width: int, height: int) -> None:
-    if render_mode is not None and render_mode not in get_args(RenderMode):
-        raise ConfigError(
-            f"render_mode {render_mode!r} is unknown; available: None, "
-            + ", ".join(repr(mode) for mode in get_args(RenderMode))
-        )
-    if render_mode == "human" and (width, height) != (DEFAULT_WIDTH, DEFAULT_HEIGHT):
-        raise ConfigError(
-            f"a window has the size that the screen gives it, not {width}x{height}; "
-            'width and height are for render_mode="rgb_array"'
-        )
+def _is_known(name: str) -> bool:
+    return hasattr(CartPoleEnv, name) or name in gymnasium.Env.__annotations__
 
 
 def _observe(simulation: Simulation) -> npt.NDArray[np.float32]:
     """The observation, also of several poles."""
     return simulation.state.astype(np.float32)
-
-
-def _as_one_pole(step: Callable[[float], State]) -> Callable[[float], State]:
-    """Steps of several poles that return what the rules look at: the worst of all poles.
-
-    That is `(x, x_dot, theta, theta_dot)` with the largest angle and the largest angular velocity,
-    without signs.
-    """
-
-    def advance(control: float) -> State:
-        state = step(control)
-        return state[0], state[1], task.farthest(state[2::2]), task.farthest(state[3::2])
-
-    return advance
 
 
 def _needs_reset(control: float) -> State:

@@ -12,7 +12,6 @@ from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
-from gymnasium.utils import seeding
 
 from mjcartpole import task
 from mjcartpole.errors import ConfigError
@@ -40,6 +39,29 @@ TASKS: Final = ("balance",)
 TIME_LIMIT: Final = task.TIME_LIMIT * task.CONTROL_STEP
 """Seconds."""
 
+HIGHLIGHT: Final = (0.0, 0.5, 0.3)
+"""What poles look like at reward 1, where rewards are to be seen: the suite's own colour."""
+
+
+class StartingStates(np.random.RandomState):
+    """Draws starting states: what dm_control calls a task's `random`.
+
+    It has the methods of a `RandomState`, and the draws of gymnasium's generators: one seed gives
+    the same starting states in both worlds.
+    """
+
+    def __init__(self, seed: int | np.random.PCG64 | None = None) -> None:
+        """Seed it; None draws a seed, and a bit generator is taken as it stands."""
+        super().__init__(seed if isinstance(seed, np.random.PCG64) else np.random.PCG64(seed))
+
+    def seed(self, seed: int | None = None) -> None:  # type: ignore[override]
+        """Start anew from a seed; None draws one."""
+        self._bit_generator.state = np.random.PCG64(seed).state
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """A copy keeps the class, and with it the way of seeding."""
+        return type(self), (self._bit_generator,)
+
 
 class Physics(mujoco.Physics):  # type: ignore[misc]
     """dm_control's physics, with readings that have names."""
@@ -52,6 +74,19 @@ class Physics(mujoco.Physics):  # type: ignore[misc]
         physics: Physics = cls.from_model(wrapper.MjModel(copy.copy(cartpole.model)))
         physics.cartpole = cartpole
         return physics
+
+    def copy(self, share_model: bool = False) -> "Physics":
+        """A copy that moves on its own; see dm_control."""
+        copied: Physics = super().copy(share_model)
+        copied.cartpole = self.cartpole
+        return copied
+
+    def __getstate__(self) -> tuple[Any, CartPole]:
+        return super().__getstate__(), self.cartpole
+
+    def __setstate__(self, state: tuple[Any, CartPole]) -> None:
+        data, self.cartpole = state
+        super().__setstate__(data)
 
     def after_reset(self) -> None:
         """Bring all that follows from the state up to date; an episode has no past."""
@@ -79,6 +114,15 @@ class Physics(mujoco.Physics):  # type: ignore[misc]
         angles: npt.NDArray[np.float64] = self.data.qpos[list(self.cartpole.hinges)]
         return angles
 
+    def show(self, reward: float) -> None:
+        """Colour the poles by a reward from 0, their own colour, to 1, `HIGHLIGHT`."""
+        own, weight = self.cartpole.model.geom_rgba, min(max(reward, 0.0), 1.0) ** 4
+        poles = self.cartpole.model.dof_bodyid[list(self.cartpole.hinges)]
+        geoms = np.isin(self.cartpole.model.geom_bodyid, poles)
+        self.model.geom_rgba[geoms, :3] = (
+            weight * np.array(HIGHLIGHT) + (1 - weight) * own[geoms, :3]
+        )
+
 
 class Balance(control.Task):  # type: ignore[misc]
     """CartPole-v1's rules as a dm_control task.
@@ -95,32 +139,57 @@ class Balance(control.Task):  # type: ignore[misc]
       states that the gymnasium environment has after `reset(seed=...)` and further resets.
 
     Attributes:
-        random: Draws the starting states.
         steps: Control steps of this episode.
     """
 
     def __init__(
-        self, cartpole: CartPole, *, random: np.random.Generator, limit: float, discrete: bool
+        self,
+        cartpole: CartPole,
+        *,
+        random: np.random.RandomState | int | None,
+        limit: float,
+        discrete: bool,
     ) -> None:
         """Take what decides an episode.
 
         Args:
             cartpole: What moves.
-            random: Draws the starting states.
+            random: Draws the starting states; or a seed, or None to draw one.
             limit: Control steps until an episode is cut off.
             discrete: Whether actions are 0 and 1, instead of controls.
         """
-        self.random = random
+        # Programs made for dm_control's suite put another one in its place, under this name.
+        self._random = (
+            random if isinstance(random, np.random.RandomState) else StartingStates(random)
+        )
         self.steps = 0
         self._controls = cartpole.controls
         self._limit = limit
         self._discrete = discrete
+        self._visualize_reward = False
+
+    @property
+    def random(self) -> np.random.RandomState:
+        """Draws the starting states; `task.random.seed(3)` starts it anew."""
+        return self._random
+
+    @property
+    def visualize_reward(self) -> bool:
+        """Whether the poles are coloured by the reward."""
+        return self._visualize_reward
+
+    @visualize_reward.setter
+    def visualize_reward(self, value: bool) -> None:
+        if not isinstance(value, bool):
+            raise ConfigError(f"visualize_reward is True or False, not {value!r}")
+        self._visualize_reward = value
 
     def initialize_episode(self, physics: Physics) -> None:
         """Draw a starting state."""
         low, high = task.RESET_LOW, task.RESET_HIGH
         size = 2 * len(physics.cartpole.joints)
         physics.put(self.random.uniform(low=low, high=high, size=size))
+        self._show_reward(physics)
         self.steps = 0
 
     def action_spec(self, physics: Physics) -> specs.BoundedArray:
@@ -128,7 +197,7 @@ class Balance(control.Task):  # type: ignore[misc]
         if self._discrete:
             return specs.DiscreteArray(task.N_ACTIONS, dtype=np.int64, name="action")
         low, high = sorted(self._controls)
-        return specs.BoundedArray((1,), np.float64, low, high, name="action")
+        return specs.BoundedArray((1,), np.float64, [low], [high], name="action")
 
     def before_step(self, action: npt.ArrayLike, physics: Physics) -> None:
         """Push.
@@ -139,8 +208,9 @@ class Balance(control.Task):  # type: ignore[misc]
         physics.set_control([self._control(np.asarray(action))])
 
     def after_step(self, physics: Physics) -> None:
-        """Count."""
+        """Count, and show the reward where that is wanted."""
         self.steps += 1
+        self._show_reward(physics)
 
     def get_observation(
         self, physics: Physics
@@ -159,6 +229,10 @@ class Balance(control.Task):  # type: ignore[misc]
         if task.has_terminated(physics.cart_position(), farthest):
             return 0.0
         return 1.0 if self.steps >= self._limit else None
+
+    def _show_reward(self, physics: Physics) -> None:
+        if self._visualize_reward:
+            physics.show(self.get_reward(physics))
 
     def _control(self, action: npt.NDArray[Any]) -> float:
         if self._discrete:
@@ -182,6 +256,7 @@ def load(
     discrete: bool = False,
     time_limit: float = TIME_LIMIT,
     environment_kwargs: dict[str, Any] | None = None,
+    visualize_reward: bool = False,
 ) -> control.Environment:
     """Make CartPole-v1 as a dm_control environment; see `Balance` for its rules.
 
@@ -203,9 +278,10 @@ def load(
         discrete: Take CartPole-v1's actions 0 and 1 instead of a control between their two.
         time_limit: Seconds until an episode is cut off; `float("inf")` for never.
         environment_kwargs: More for dm_control's `Environment`, such as `flat_observation`.
+        visualize_reward: Colour the poles by the reward, in pictures.
 
     Raises:
-        ConfigError: There is no such task, or the seed or time limit makes no sense.
+        ConfigError: There is no such task, or a setting makes no sense.
         ModelError: The model cannot be used.
     """
     if task_name not in TASKS:
@@ -218,8 +294,8 @@ def load(
     limit = time_limit
     if not math.isinf(time_limit):
         limit = max(1, round(time_limit / cartpole.control_step))
-    random, _ = seeding.np_random(seed)
-    balance = Balance(cartpole, random=random, limit=limit, discrete=discrete)
+    balance = Balance(cartpole, random=seed, limit=limit, discrete=discrete)
+    balance.visualize_reward = visualize_reward
     # Without dm_control's half steps, a step is one call of mj_step, whatever the solver.
     settings = {"legacy_step": False, **(environment_kwargs or {})}
     physics = Physics.of(cartpole)

@@ -1,31 +1,25 @@
 """Many cart-poles at once, as a `gymnasium.vector.VectorEnv` on `mujoco.batch`."""
 
+import copy
 import functools
 from typing import Any, Final, Literal, get_args
 
-import mjcartpole.physics  # noqa: F401 - first: it imports MuJoCo where there is no OpenGL
-
-# isort: split
-
-import mujoco
 import numpy as np
 import numpy.typing as npt
 from gymnasium import logger, spaces
-from gymnasium.envs.classic_control.utils import maybe_parse_reset_bounds
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
-from mujoco.batch import Batch
 
 from mjcartpole import task
 from mjcartpole.envs.registration import ENV_ID
 from mjcartpole.errors import ConfigError, InvalidActionError, ResetNeededError
-from mjcartpole.integrator import Integrator, check_integrator
+from mjcartpole.integrator import Integrator
 from mjcartpole.media.renderer import DEFAULT_HEIGHT, DEFAULT_WIDTH, Renderer, open_renderer
 from mjcartpole.media.scene import DEFAULT_CAMERA, check_picture
+from mjcartpole.physics.batch_simulation import BatchSimulation
 from mjcartpole.physics.model import Edits, ModelLike, load_model
-from mjcartpole.physics.simulation import LARGEST_SANE, check_sane, stepping_model
 
-VectorRenderMode = Literal["rgb_array"]
+VectorRenderMode = Literal["rgb_array", "rgb_array_list"]
 
 _DEFAULT_PICTURE: Final = (DEFAULT_WIDTH, DEFAULT_HEIGHT, DEFAULT_CAMERA)
 
@@ -73,7 +67,8 @@ class CartPoleVectorEnv(
     returns a new starting state, reward 0 and no ending (`AutoresetMode.NEXT_STEP`).
 
     `reset(seed=..., options={"low": ..., "high": ...})` restarts all; the bounds hold until the
-    next `reset`, also where an environment restarts by itself.
+    next `reset`, also where an environment restarts by itself. `options={"reset_mask": ...}`, a
+    boolean array, restarts those where it is true.
 
     ## Arguments
 
@@ -86,15 +81,16 @@ class CartPoleVectorEnv(
     | `own_timestep`        | bool                   | False       | One physics step of the file per action, instead of 0.02 s |
     | `integrator`          | "gym" or "mujoco"      | "gym"       | As in `CartPoleEnv`           |
     | `sutton_barto_reward` | bool                   | False       | 0 per step and -1 at termination, instead of 1 per step |
-    | `threads`             | int or None            | None        | Threads that step; None: one per core |
-    | `render_mode`         | None or "rgb_array"    | None        | Nothing, or one picture per environment |
+    | `threads`             | int or None            | None        | Threads that step; None: as many as pay, which the time decides |
+    | `render_mode`         | None, "rgb_array", "rgb_array_list" | None | Nothing, or one picture per environment (the two are the same, as in gymnasium's vector) |
     | `width`, `height`     | int                    | 640, 480    | Size of a picture, in pixels  |
     | `camera`              | str                    | "side"      | A camera of the model         |
 
-    `envs.state` reads and sets the float64 states, shape `(num_envs, 4)` for a model with one pole;
-    each further pole has two more values.
+    `envs.state` reads and sets the float64 states, shape `(4, num_envs)` for a model with one pole,
+    as in gymnasium's `CartPoleVectorEnv`; each further pole has two more rows. A copy of the vector
+    (`copy.deepcopy`, `pickle`) goes on by itself, bit for bit as the original would.
 
-    >>> envs.state = [(0.0, 0.0, 0.1, 0.0)] * 3
+    >>> envs.state = [(0, 0, 0), (0, 0, 0), (0.1, 0.1, 0.1), (0, 0, 0)]
     >>> [round(float(value), 4) for value in envs.step([1, 0, 1])[0][0]]
     [0.0, 0.1936, 0.1, -0.2595]
     >>> envs.close()
@@ -105,7 +101,7 @@ class CartPoleVectorEnv(
     """  # noqa: E501 - a table's rows cannot be wrapped
 
     metadata: dict[str, Any] = {  # noqa: RUF012 - gymnasium's own declaration
-        "render_modes": list(get_args(VectorRenderMode)),
+        "render_modes": ["rgb_array"],
         "render_fps": task.frame_rate(),
         "autoreset_mode": AutoresetMode.NEXT_STEP,
     }
@@ -136,10 +132,12 @@ class CartPoleVectorEnv(
         """
         self.num_envs = _count("num_envs", num_envs)
         self.max_episode_steps = _count("max_episode_steps", max_episode_steps)
-        check_integrator(integrator)
+        threads = None if threads is None else _count("threads", threads)
         _check_render_mode(render_mode)
         self.render_mode = render_mode
         self.cartpole = load_model(model, edits, own_timestep=own_timestep)
+        self._simulation = BatchSimulation(self.cartpole, self.num_envs, integrator, threads)
+        self._controls = np.array(self.cartpole.controls)
         if render_mode is not None or (width, height, camera) != _DEFAULT_PICTURE:
             check_picture(self.cartpole, width, height, camera)
         self.metadata = self.metadata | {"render_fps": task.frame_rate(self.cartpole.control_step)}
@@ -149,87 +147,101 @@ class CartPoleVectorEnv(
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self._sutton_barto_reward = sutton_barto_reward
-        self._prepare_physics(integrator, 0 if threads is None else _count("threads", threads))
         self._prepare_episodes()
         self._open_renderer = functools.partial(
             open_renderer, self.cartpole, width=width, height=height, camera=camera
         )
         self._renderer: Renderer | None = None
 
-    def _prepare_physics(self, integrator: Integrator, threads: int) -> None:
-        """Make the batch, and views of what is read and written in each step."""
-        cartpole = self.cartpole
-        model = stepping_model(cartpole.model, integrator)
-        self._batch = batch = Batch(model, self.num_envs, threads, _needs_own_data(model))
-        self._explicit = integrator == "gym"
-        self._timestep = cartpole.timestep
-        self._fresh = batch.state[0].copy()
-        qpos, qvel = batch.bind("qpos"), batch.bind("qvel")
-        # The batch keeps one row per environment; these are columns of it, shape (num_envs,).
-        self._columns = [(qpos[:, joint], qvel[:, joint]) for joint in cartpole.joints]
-        self._control = batch.bind("ctrl")[:, 0]
-        self._controls = np.array(cartpole.controls)
-
     def _prepare_episodes(self) -> None:
-        """Make the arrays that live from step to step."""
-        n, joints = self.num_envs, len(self.cartpole.joints)
+        """Make what lives from step to step."""
         self._bounds = task.RESET_LOW, task.RESET_HIGH
         self._has_state = False
-        # The same numbers as in the batch, side by side: what numpy is quick with.
-        self._state = np.zeros((n, 2 * joints))
-        self._positions, self._velocities = self._state[:, 0::2], self._state[:, 1::2]
-        self._sizes = np.empty_like(self._state)
-        self._moves = np.empty((n, joints))
-        # Steps since the reset of all, and at which of them each episode is truncated.
+        # Steps so far, and at which of them each episode is truncated.
         self._clock = 0
-        self._deadlines = np.full(n, self.max_episode_steps)
+        self._deadlines = np.full(self.num_envs, self.max_episode_steps)
         # Indices of the environments whose last step ended an episode.
         self._ended = _NOBODY
 
+    def __getstate__(self) -> dict[str, Any]:
+        """All but the renderer, which belongs to one thread: a copy opens its own."""
+        return {**self.__dict__, "_renderer": None}
+
+    def __copy__(self) -> "CartPoleVectorEnv":
+        """A copy that goes on by itself."""
+        return copy.deepcopy(self)
+
     @property
     def state(self) -> npt.NDArray[np.float64] | None:
-        """The float64 states, shape (num_envs, 4) with one pole, a copy; None before a reset.
+        """The float64 states, shape (4, num_envs) with one pole; None before a reset.
 
-        Each is `(x, x_dot, theta, theta_dot, …)`: m, m/s, rad, rad/s. Setting it leaves nothing of
-        the motion before; the episodes go on, and those that are over restart with the next step.
+        The rows are `x, x_dot, theta, theta_dot, …`: m, m/s, rad, rad/s, as in gymnasium's vector.
+        It is a copy, and read-only, so that nobody writes into it in vain: states are set as a
+        whole. That leaves nothing of the motion before; the episodes go on, and those that are over
+        restart with the next step.
         """
-        return self._state.copy() if self._has_state else None
+        if not self._has_state:
+            return None
+        state = self._simulation.state.T.copy()
+        state.flags.writeable = False
+        return state
 
     @state.setter
     def state(self, states: npt.ArrayLike) -> None:
-        values = np.asarray(states, dtype=np.float64)
-        if values.shape != self._state.shape:
+        values, shape = np.asarray(states, dtype=np.float64), self._simulation.state.T.shape
+        if values.shape != shape:
             raise ConfigError(
-                f"states have the shape {self._state.shape}: "
-                f"({', '.join(task.state_names(self.cartpole.poles))}) of each environment, "
+                f"states have the shape {shape}: one row each of "
+                f"{', '.join(task.state_names(self.cartpole.poles))}, one column per environment, "
                 f"not the shape {values.shape}"
             )
-        self._place(_EVERYONE, values)
+        self._simulation.put(_EVERYONE, values.T)
         self._has_state = True
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[npt.NDArray[np.float32], dict[str, Any]]:
-        """Start an episode in every environment.
+        """Start an episode in every environment, or in some.
 
         Args:
             seed: Seeds the generator that all environments share, as gymnasium describes.
-            options: `{"low": float, "high": float}`, bounds of the starting states until the
-                next reset.
+            options: `"low"` and `"high"`, bounds of the starting states until the next reset;
+                `"reset_mask"`, a boolean array of shape (num_envs,): who starts, instead of all.
 
         Returns:
             Observations, shape (num_envs, 4) with one pole, and an empty dict.
 
         Raises:
-            ValueError: A bound is no number, or low is above high.
+            ConfigError: An option is unknown, or makes no sense.
+            ResetNeededError: Some are to start before all have started once.
         """
+        bounds = task.start_bounds(options, "reset_mask")
+        who = self._mask((options or {}).get("reset_mask"))
         super().reset(seed=seed)
-        self._bounds = maybe_parse_reset_bounds(options, task.RESET_LOW, task.RESET_HIGH)
-        self.state = self._draw(self.num_envs)
-        self._clock = 0
-        self._deadlines.fill(self.max_episode_steps)
-        self._ended = _NOBODY
-        return self._state.astype(np.float32), {}
+        self._bounds = bounds
+        self._simulation.put(who, self._draw(who.size))
+        self._has_state = True
+        self._deadlines[who] = self._clock + self.max_episode_steps
+        self._ended = np.setdiff1d(self._ended, who, assume_unique=True)
+        return self._simulation.state.astype(np.float32), {}
+
+    def _mask(self, mask: object) -> npt.NDArray[np.intp]:
+        """Indices of the environments that a reset is for."""
+        if mask is None:
+            return np.arange(self.num_envs)
+        if not (
+            isinstance(mask, np.ndarray)
+            and mask.dtype == np.bool_
+            and mask.shape == (self.num_envs,)
+            and mask.any()
+        ):
+            raise ConfigError(
+                f"reset_mask is a numpy array of {self.num_envs} booleans, one at least True, "
+                f"not {mask!r}"
+            )
+        if not self._has_state:
+            raise ResetNeededError("Call reset without reset_mask first: all need a state.")
+        return mask.nonzero()[0]
 
     def step(
         self, actions: npt.ArrayLike
@@ -257,16 +269,12 @@ class CartPoleVectorEnv(
         controls = self._controls.take(self._valid(actions))
         if not self._has_state:
             raise ResetNeededError("Call reset before using step method.")
-        self._control[...] = controls
-        if self._explicit:
-            self._explicit_euler()
-        else:
-            self._own_integrator()
+        self._simulation.step(controls)
         self._clock += 1
         restarted = self._ended
         if restarted.size:
             # Their step is thrown away, as gymnasium does: cheaper than to choose who steps.
-            self._place(restarted, self._draw(restarted.size))
+            self._simulation.put(restarted, self._draw(restarted.size))
             self._deadlines[restarted] = self._clock + self.max_episode_steps
         terminations = self._have_terminated()
         truncations = self._deadlines <= self._clock
@@ -275,7 +283,7 @@ class CartPoleVectorEnv(
             rewards[restarted] = 0.0
             terminations[restarted] = False
         self._ended = np.logical_or(terminations, truncations).nonzero()[0]
-        return self._state.astype(np.float32), rewards, terminations, truncations, {}
+        return self._simulation.state.astype(np.float32), rewards, terminations, truncations, {}
 
     def _valid(self, actions: npt.ArrayLike) -> npt.NDArray[np.integer[Any]]:
         """The actions as an array, if `action_space.contains` them."""
@@ -294,40 +302,13 @@ class CartPoleVectorEnv(
             )
         return np.asarray(actions)
 
-    def _explicit_euler(self) -> None:
-        """Positions move by the old velocities, velocities as MuJoCo says."""
-        for _ in range(self.cartpole.substeps):
-            np.multiply(self._velocities, self._timestep, out=self._moves)
-            self._positions += self._moves
-            self._batch.step()
-            for joint, (qpos, qvel) in enumerate(self._columns):
-                qpos[...] = self._positions[:, joint]
-                self._velocities[:, joint] = qvel
-
-    def _own_integrator(self) -> None:
-        self._batch.step(nstep=self.cartpole.substeps)
-        for joint, (qpos, qvel) in enumerate(self._columns):
-            self._positions[:, joint], self._velocities[:, joint] = qpos, qvel
-
     def _have_terminated(self) -> npt.NDArray[np.bool_]:
-        """Whose state is beyond a limit, shape (num_envs,); a new array.
-
-        Raises:
-            SimulationError: A state is NaN or beyond all bounds.
-        """
-        sizes = np.abs(self._state, out=self._sizes)
-        # One look at the largest number finds NaN and infinity too.
-        if not sizes.max() < LARGEST_SANE:
-            self._refuse_diverged()
+        """Whose state is beyond a limit, shape (num_envs,); a new array."""
+        sizes = self._simulation.sizes()
         over = sizes[:, 0] > task.X_LIMIT
         for pole in range(self.cartpole.poles):
             over |= sizes[:, 2 + 2 * pole] > task.THETA_LIMIT
         return over
-
-    def _refuse_diverged(self) -> None:
-        index = int(np.flatnonzero(~(self._sizes < LARGEST_SANE).all(axis=1))[0])
-        name = f"{self.cartpole.name} (environment {index} of {self.num_envs})"
-        check_sane(tuple(self._state[index].tolist()), name)
 
     def _rewards(self, terminations: npt.NDArray[np.bool_]) -> npt.NDArray[np.float32]:
         if self._sutton_barto_reward:
@@ -337,20 +318,9 @@ class CartPoleVectorEnv(
     def _draw(self, n: int) -> npt.NDArray[np.float64]:
         """Starting states of n environments, one row each, drawn in gymnasium's order."""
         low, high = self._bounds
-        return self.np_random.uniform(low=low, high=high, size=(self._state.shape[1], n)).T
-
-    def _place(self, ids: npt.NDArray[np.intp] | slice, states: npt.NDArray[np.float64]) -> None:
-        """Put environments into states, one row each; nothing of their past remains."""
-        if self._batch.persistent:
-            self._batch.reset(
-                np.arange(self.num_envs)[ids], stage=int(mujoco.mjtStage.mjSTAGE_NONE)
-            )
-        else:
-            # The row is all there is, and to copy it is a hundred times quicker than `reset`.
-            self._batch.state[ids] = self._fresh
-        for joint, (qpos, qvel) in enumerate(self._columns):
-            qpos[ids], qvel[ids] = states[:, 2 * joint], states[:, 2 * joint + 1]
-        self._state[ids] = states
+        return self.np_random.uniform(
+            low=low, high=high, size=(self._simulation.state.shape[1], n)
+        ).T
 
     def render(self) -> tuple[npt.NDArray[np.uint8], ...] | None:
         """Draw the current states.
@@ -371,9 +341,8 @@ class CartPoleVectorEnv(
             return None
         if not self._has_state:
             return None
-        if self._renderer is None:
-            self._renderer = self._open_renderer()
-        return tuple(self._renderer.render(state) for state in self._state)
+        renderer = self._renderer = self._renderer or self._open_renderer()
+        return tuple(renderer.render(state) for state in self._simulation.state)
 
     def close(self, **kwargs: object) -> None:
         """Free the renderer, if there is one."""
@@ -381,12 +350,6 @@ class CartPoleVectorEnv(
             self._renderer.close()
         self._renderer = None
         super().close(**kwargs)
-
-
-def _needs_own_data(model: mujoco.MjModel) -> bool:
-    """Whether a model remembers more than its state, so that each environment needs an MjData."""
-    remembering = int(mujoco.mjtEnableBit.mjENBL_SLEEP) | int(mujoco.mjtEnableBit.mjENBL_IPC)
-    return bool(model.opt.enableflags & remembering) or model.nplugin > 0
 
 
 def _count(name: str, value: int) -> int:
@@ -399,6 +362,7 @@ def _count(name: str, value: int) -> int:
 def _check_render_mode(render_mode: str | None) -> None:
     if render_mode is not None and render_mode not in get_args(VectorRenderMode):
         raise ConfigError(
-            f"render_mode {render_mode!r} is unknown for a vector; available: None, "
+            f"render_mode {render_mode!r} is not for a vector that moves as one; available: None, "
             + ", ".join(repr(mode) for mode in get_args(VectorRenderMode))
+            + '; make_vec(..., vectorization_mode="sync") takes those of a single environment'
         )

@@ -13,6 +13,7 @@ from mjcartpole.errors import SimulationError
 from mjcartpole.integrator import Integrator
 from mjcartpole.learning import kernels
 from mjcartpole.learning.discretizer import Discretizer, Grid
+from mjcartpole.learning.engine import compiling
 from mjcartpole.learning.episodes import EpisodeLog
 from mjcartpole.learning.loop import in_episode
 from mjcartpole.learning.policy import Policy
@@ -99,31 +100,48 @@ class CompiledLoop:
         Raises:
             SimulationError: The physics diverged; names episode and step.
         """
-        common = (
-            self._physics,
-            _arrays(discretizer.grid),
-            _method(learner),
-            learner.q_table.reshape(-1),
-            (env_rng, learner.rng),
-        )
         number = numbers.start
         while number < numbers.stop:
             self._scratch.finished[0] = number
             try:
-                _run(
-                    kernels.learn_chunk,
-                    *common,
-                    (number, numbers.stop),
-                    self._chunk,
-                    log.storage,
-                    self._scratch,
-                )
+                self._learn(learner, discretizer, env_rng, log, (number, numbers.stop))
             finally:
                 # A signal that came meanwhile is raised before `_run` can return anything.
                 number = int(self._scratch.finished[0])
                 log.extend_to(number)
             self._check(number)
             yield number
+
+    def compile(
+        self,
+        learner: TabularQ,
+        discretizer: Discretizer,
+        env_rng: np.random.Generator,
+        log: EpisodeLog,
+    ) -> None:
+        """Compile what `learn` runs, or load it from the cache; nothing is learned."""
+        self._learn(learner, discretizer, env_rng, log, (0, 0))
+
+    def _learn(
+        self,
+        learner: TabularQ,
+        discretizer: Discretizer,
+        env_rng: np.random.Generator,
+        log: EpisodeLog,
+        numbers: tuple[int, int],
+    ) -> None:
+        _run(
+            kernels.learn_chunk,
+            self._physics,
+            _arrays(discretizer.grid),
+            _method(learner),
+            learner.q_table.reshape(-1),
+            (env_rng, learner.rng),
+            numbers,
+            self._chunk,
+            log.storage,
+            self._scratch,
+        )
 
     def play(self, policy: Policy, env_rng: np.random.Generator, episodes: int) -> EpisodeLog:
         """Play greedy episodes, as `play_episode` does.
@@ -224,7 +242,12 @@ class _Announcer(event.Listener):
 
     said = False
 
+    def __init__(self) -> None:
+        self._depth = 0
+
     def on_start(self, event: event.Event) -> None:
+        self._depth += 1
+        compiling.add(self)
         if not _Announcer.said:
             _Announcer.said = True
             _log.info(
@@ -233,14 +256,20 @@ class _Announcer(event.Listener):
             )
 
     def on_end(self, event: event.Event) -> None:
-        pass
+        # What the loop calls is compiled in between, each with a start and an end of its own.
+        self._depth -= 1
+        if self._depth <= 0:
+            compiling.discard(self)
 
 
 def _run(kernel: Callable[..., int], *arguments: object) -> int:
-    with event.install_listener("numba:compile", _Announcer()):
+    announcer = _Announcer()
+    with event.install_listener("numba:compile", announcer):
         try:
             return kernel(*arguments)
         except Exception:
             # A kernel raises nothing itself. Its cache cannot be read or written (damaged, a full
             # disk; numba lets through OSError, EOFError and what pickle raises): go on without.
             return kernels.uncached(kernel)(*arguments)
+        finally:
+            compiling.discard(announcer)

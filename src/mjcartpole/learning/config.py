@@ -66,7 +66,7 @@ PRESETS: Final[dict[str, dict[str, Any]]] = {
 """What each preset changes in the defaults of `TrainConfig`, which are those of `tuned`."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class TrainConfig:
     """All that decides a training. Equal configs give equal tables, bit for bit."""
 
@@ -85,8 +85,8 @@ class TrainConfig:
     seed: int = 0
     """Seeds the environment and the learner."""
     bins: tuple[int, ...] = (1, 3, 6, 8)
-    """Bins for x, x_dot, theta and theta_dot; 1 ignores a dimension. With several poles the last
-    two hold for each, here and below, unless two more are given for each."""
+    """Bins for x, x_dot, theta and theta_dot, such as 1,3,6,8; 1 ignores a dimension. With several
+    poles the last two hold for each, here and below, unless two more are given for each."""
     low: tuple[float, ...] = (-2.4, -0.75, -0.2095, -1.5)
     """Lower ends of the bins' ranges; what lies outside belongs to the edge bins."""
     high: tuple[float, ...] = (2.4, 0.75, 0.2095, 1.5)
@@ -149,6 +149,13 @@ class TrainConfig:
                 f"TrainConfig has no field {', '.join(unknown)}; available: {', '.join(known)}"
             )
         return cls(**{**PRESETS[name], **changes})
+
+    def __repr__(self) -> str:
+        """What differs from the defaults; it evaluates to an equal config."""
+        fields = dataclasses.fields(self)
+        values = ((field, getattr(self, field.name)) for field in fields)
+        changed = [f"{field.name}={value!r}" for field, value in values if value != field.default]
+        return f"TrainConfig({', '.join(changed)})"
 
     def load_model(self) -> "CartPole":
         """The model that the config names; for backend gym the reference, which is drawn for it.

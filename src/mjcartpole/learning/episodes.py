@@ -45,6 +45,9 @@ class Columns(NamedTuple):
     endings: npt.NDArray[np.int8]
     """Indices of `ENDINGS`."""
 
+    def __repr__(self) -> str:
+        return f"Columns({len(self.totals):,} episodes)"
+
 
 class EpisodeLog(Sequence[Episode]):
     """The episodes of a training.
@@ -75,6 +78,10 @@ class EpisodeLog(Sequence[Episode]):
         log._length = len(columns.totals)
         log._put(slice(log._length), *columns)
         return log
+
+    def __repr__(self) -> str:
+        mean = f", mean return {self.columns.totals.mean():.2f}" if len(self) else ""
+        return f"EpisodeLog({len(self):,} episodes{mean})"
 
     def csv(self) -> str:
         """One line per episode, numbered from 1, under a line of names."""

@@ -24,7 +24,7 @@ FORMAT = "mjcartpole-policy"
 VERSION = 1
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Policy:
     """Takes the better action of the observation's row; action 0 between equals.
 
@@ -36,7 +36,7 @@ class Policy:
 
     discretizer: Discretizer
     q_table: npt.NDArray[np.float64]
-    actions: npt.NDArray[np.int64] = field(init=False, repr=False)
+    actions: npt.NDArray[np.int64] = field(init=False)
 
     def __post_init__(self) -> None:
         expected = (*self.discretizer.bins, N_ACTIONS)
@@ -57,6 +57,9 @@ class Policy:
         values = observation.tolist() if isinstance(observation, np.ndarray) else observation
         action: int = self._actions[self.discretizer(values)]  # type: ignore[attr-defined]
         return action
+
+    def __repr__(self) -> str:
+        return f"Policy(bins={self.discretizer.bins}, {self.discretizer.n_states:,} states)"
 
     @property
     def poles(self) -> int:

@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Final
 
 import gymnasium
@@ -25,7 +25,7 @@ LEARNER_STREAM: Final = 1
 """Spawn key of the learner's generator: its draws are independent of the env's."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class TrainResult:
     """What a training, or the part of it that was done, has come to.
 
@@ -33,7 +33,7 @@ class TrainResult:
         config: What was asked for.
         policy: The greedy policy of the final table.
         episodes: One record per episode that was finished.
-        seconds: Time it took.
+        seconds: Time it took, without that for compiling the loop.
     """
 
     config: TrainConfig
@@ -56,6 +56,9 @@ class TrainResult:
         """Environment steps of all episodes."""
         return int(self.episodes.columns.steps.sum())
 
+    def __repr__(self) -> str:
+        return f"TrainResult({self.config!r}, {self.episodes!r}, {self.policy!r})"
+
 
 @dataclass(frozen=True, eq=False)
 class Snapshot:
@@ -69,10 +72,10 @@ class Snapshot:
         seconds: Time they took.
     """
 
-    q_table: npt.NDArray[np.float64]
-    env_rng: dict[str, Any]
-    learner_rng: dict[str, Any]
-    columns: Columns
+    q_table: npt.NDArray[np.float64] = field(repr=False)
+    env_rng: dict[str, Any] = field(repr=False)
+    learner_rng: dict[str, Any] = field(repr=False)
+    columns: Columns = field(repr=False)
     seconds: float
 
 
@@ -135,7 +138,7 @@ class Training:
             self._env = make_env(*physics)
 
     def run(self) -> Iterator[int]:
-        """Train to the end.
+        """Train to the end; the clock starts when the loop is compiled.
 
         Yields:
             The number of finished episodes, after each or after some thousands of steps.
@@ -145,6 +148,8 @@ class Training:
         """
         numbers = range(len(self.log), self.config.episodes)
         run = self._run_compiled if self.engine == "compiled" else self._run_python
+        if self.engine == "compiled":
+            self._loop.compile(self.learner, self.discretizer, self._env_rng, self.log)
         before, started = self._seconds, time.perf_counter()
         for finished in run(numbers):
             self._seconds = before + time.perf_counter() - started

@@ -26,6 +26,7 @@ from typing import Final, Protocol, get_args
 from mjcartpole.errors import RenderError
 from mjcartpole.media import trial
 from mjcartpole.media.trial import PLATFORM_VARIABLE, try_backend
+from mjcartpole.media.turns import end_drawing
 
 Backend = trial.Backend
 
@@ -251,6 +252,7 @@ def _register_once() -> None:
 
 
 def _close_all() -> None:
+    end_drawing()
     for renderer in list(_open):
         renderer.close()
 

@@ -99,7 +99,8 @@ def _command(path: Path, size: tuple[int, int], fps: float, ffmpeg: FFmpeg) -> l
         steps.insert(0, "crop={}:{}:0:0".format(*even(size)))
     codec = ["-c:v", ffmpeg.codec, *CODECS[ffmpeg.codec]]
     # faststart: the index comes first, so that a browser can play before it has all.
-    target = ["-movflags", "+faststart", "-f", "mp4", str(path)]
+    # file: for ffmpeg a bare name could mean a protocol, such as concat:, or an option.
+    target = ["-movflags", "+faststart", "-f", "mp4", f"file:{path}"]
     quiet = ["-hide_banner", "-loglevel", "error", "-nostdin", "-y"]
     return [
         ffmpeg.program,

@@ -2,7 +2,6 @@
 
 import contextlib
 import re
-import secrets
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,6 +12,7 @@ import numpy.typing as npt
 
 from mjcartpole.errors import FileError
 from mjcartpole.files import make_folder
+from mjcartpole.leftovers import name_aside, temporary_beside
 
 _NUMBERED: Final = re.compile(r"\d{6,}\.png")
 
@@ -65,15 +65,15 @@ def replacing_folder(path: Path) -> Iterator[Path]:
     """
     check_folder(path)
     make_folder(path.parent)
-    temporary = path.with_name(f".{path.name}-{secrets.token_hex(4)}")
     try:
-        temporary.mkdir()
-        yield temporary
-        _replace(path, temporary)
+        with temporary_beside(path, Path.mkdir) as temporary:
+            try:
+                yield temporary
+                _replace(path, temporary)
+            finally:
+                shutil.rmtree(temporary, ignore_errors=True)
     except OSError as error:
         raise FileError(f"cannot write '{path}': {error.strerror or error}") from error
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
 
 
 def _replace(path: Path, new: Path) -> None:
@@ -81,7 +81,7 @@ def _replace(path: Path, new: Path) -> None:
     if not path.exists():
         new.rename(path)
         return
-    old = new.with_name(f"{new.name}-old")
+    old = name_aside(new, path)
     path.rename(old)
     try:
         new.rename(path)

@@ -14,6 +14,7 @@ from mjcartpole.media.quality import DEFAULT_QUALITY, Quality
 from mjcartpole.media.scene import DEFAULT_CAMERA, Box, Scene
 from mjcartpole.media.sketch import SketchRenderer
 from mjcartpole.media.trial import Backend
+from mjcartpole.media.turns import TakesTurns, drawing
 from mjcartpole.physics.model import CartPole
 
 Kind = Literal["auto", "egl", "osmesa", "glfw", "sketch"]
@@ -26,6 +27,8 @@ DEFAULT_HEIGHT: Final = 480
 
 class Renderer(Protocol):
     """Draws states; a context manager that closes itself at the end.
+
+    Any thread may use it; several at the same time take turns.
 
     Attributes:
         kind: Who draws: `"egl"`, `"osmesa"`, `"glfw"` or `"sketch"`.
@@ -83,7 +86,11 @@ def open_renderer(
     """
     if kind not in get_args(Kind):
         raise RenderError(f"renderer {kind!r} is unknown; available: {', '.join(get_args(Kind))}")
-    scene = Scene(cartpole, width, height, camera, quality)
+    with drawing():
+        return _open(Scene(cartpole, width, height, camera, quality), kind)
+
+
+def _open(scene: Scene, kind: Kind) -> Renderer:
     if kind == "sketch":
         return SketchRenderer(scene)
     if kind != "auto":
@@ -106,7 +113,7 @@ def _open_by_name(scene: Scene, backend: Backend) -> "GLRenderer":
     return GLRenderer(scene, backend)
 
 
-class GLRenderer:
+class GLRenderer(TakesTurns):
     """Draws with MuJoCo's own OpenGL renderer.
 
     On a CPU, time goes with pixels. Where camera and lights stand still, only the box around what
@@ -124,6 +131,7 @@ class GLRenderer:
         Raises:
             RenderError: The backend gives no context, or MuJoCo cannot draw into it.
         """
+        super().__init__()
         self.kind: str = backend
         self.scene = scene
         self._whole: Box = (0, 0, scene.width, scene.height)
@@ -158,6 +166,10 @@ class GLRenderer:
         Raises:
             RenderError: The renderer is closed, or it is no state.
         """
+        with self.taking_turns():
+            return self._render(state)
+
+    def _render(self, state: npt.ArrayLike) -> npt.NDArray[np.uint8]:
         if self._drawing is None:
             raise RenderError("the renderer is closed; open another one")
         if self._has_background and self._background is None:
@@ -197,14 +209,15 @@ class GLRenderer:
 
     def close(self) -> None:
         """Free MuJoCo's resources, then the context; a second call does nothing."""
-        drawing, self._drawing = self._drawing, None
         if self._context.is_lost:
             return  # A fork's copy: it belongs to the process that made it.
-        if drawing is not None:
-            self._context.make_current()
-            drawing.free()
-            self._context.release()
-        self._context.free()
+        with self.taking_turns():
+            resources, self._drawing = self._drawing, None
+            if resources is not None:
+                self._context.make_current()
+                resources.free()
+                self._context.release()
+            self._context.free()
 
     def __enter__(self) -> Self:
         return self

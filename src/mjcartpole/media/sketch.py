@@ -17,12 +17,13 @@ from PIL import Image, ImageDraw
 from mjcartpole.errors import RenderError
 from mjcartpole.media.outlines import Outline, outline_of, outline_of_wedge
 from mjcartpole.media.scene import Box, Scene
+from mjcartpole.media.turns import TakesTurns
 
 _BLACK: Final = (0, 0, 0)
 _OPAQUE: Final = 255
 
 
-class SketchRenderer:
+class SketchRenderer(TakesTurns):
     """Draws any cart-pole on any machine.
 
     It knows boxes, capsules, cylinders, spheres, ellipsoids, planes and (by their outline)
@@ -34,6 +35,7 @@ class SketchRenderer:
     """
 
     def __init__(self, scene: Scene) -> None:
+        super().__init__()
         self.kind = "sketch"
         self.scene = scene
         self._is_closed = False
@@ -50,6 +52,10 @@ class SketchRenderer:
         Raises:
             RenderError: The renderer is closed, or it is no state.
         """
+        with self.taking_turns():
+            return self._render(state)
+
+    def _render(self, state: npt.ArrayLike) -> npt.NDArray[np.uint8]:
         scene = self.scene
         if self._is_closed:
             raise RenderError("the renderer is closed; open another one")

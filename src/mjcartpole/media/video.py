@@ -33,6 +33,7 @@ DEFAULT_FPS: Final = 50
 """Frames per second of real time, since a control step takes 0.02 s."""
 
 _MOST_FPS: Final = 1000
+_ENDING: Final = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
 _FRAMES_AHEAD: Final = 4
 """How many frames may wait for the encoder."""
 
@@ -86,7 +87,7 @@ def write_video(
     ffmpeg = _find_ffmpeg(target) if suffix == ".mp4" else None
     if suffix == ".mp4" and ffmpeg is None:
         suffix, target = ".gif", target.with_suffix(".gif")
-    with _ended_by_sigterm():
+    with _cleaned_up_by_signals():
         first, stream = _peek(frames)
         return _write(target, suffix, _checked(stream, first.shape), first, fps, ffmpeg)
 
@@ -236,18 +237,18 @@ def _put(
 
 
 @contextlib.contextmanager
-def _ended_by_sigterm() -> Iterator[None]:
-    """Have `kill` clean up as Ctrl-C does, where nobody else has a say in it."""
+def _cleaned_up_by_signals() -> Iterator[None]:
+    """Have `kill` and a closed terminal clean up as Ctrl-C does, where nobody else has a say."""
 
     def stop(number: int, _: FrameType | None) -> NoReturn:
         raise SystemExit(128 + number)
 
     main = threading.current_thread() is threading.main_thread()
-    if not main or signal.getsignal(signal.SIGTERM) is not signal.SIG_DFL:
-        yield
-        return
-    signal.signal(signal.SIGTERM, stop)
+    ending = [number for number in _ENDING if main and signal.getsignal(number) is signal.SIG_DFL]
+    for number in ending:
+        signal.signal(number, stop)
     try:
         yield
     finally:
-        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        for number in ending:
+            signal.signal(number, signal.SIG_DFL)

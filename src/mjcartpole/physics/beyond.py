@@ -4,57 +4,104 @@ Where nothing is left out, MuJoCo and `equations` with the model's parameters mu
 """
 
 from collections.abc import Iterator
+from typing import Final
 
 import mujoco
 import numpy as np
 
+from mjcartpole.errors import ModelError
 from mjcartpole.physics.bodies import moving_bodies
-from mjcartpole.physics.model import CartPole
+from mjcartpole.physics.deviations import deviations
+from mjcartpole.physics.engine_check import unexplained_forces
+from mjcartpole.physics.equations import CARTPOLE_V1, Parameters
+from mjcartpole.physics.file_steps import file_step, method_of
+from mjcartpole.physics.free_region import free_region
+from mjcartpole.physics.model import CartPole, with_options
 from mjcartpole.physics.parameters import (
-    TILT,
-    Vector,
-    axes_of,
-    forces_of,
+    can_push,
+    is_on,
     joint_label,
     label,
-    pole_of,
+    read_parameters,
     several_poles,
 )
+from mjcartpole.physics.simulation import Simulation
+
+Effect = tuple[str, str]
+"""The kind of force by which it acts (MuJoCo's `qfrc_…`), and a phrase that names it."""
+
+_STEPS: Final = 64
+_BOX: Final = (4.8, 10.0, np.pi, 10.0)
+"""Sampled states are within ± this: m, m/s, rad, rad/s."""
+
+_SAME_STEP: Final = 1e-9
+"""Of the values of a step, relative: more than rounding, less than another integrator's."""
 
 
 def beyond_equations(cartpole: CartPole) -> list[str]:
     """Everything in a model that acts on its motion and is not in the equations, by name.
 
     What a flag of the file switches off, or what cannot act (a tendon without stiffness, the
-    reference angle of a pole that is upright at angle 0), is not listed. Contacts count where two
-    geoms may collide by MuJoCo's rules, wherever they are.
+    reference angle of a spring without stiffness), is not listed, nor what is met only outside
+    the limits that end an episode, as a joint's range and geoms that collide may be. Whether
+    anything acts is seen in the engine's own forces; the names are those of the usual effects.
 
     Returns:
         One phrase each; empty if the equations cover the model.
     """
-    found: list[str] = []
-    parts = (_poles, _directions, _joints, _actuator)
-    for look in (*parts, _contacts, _ties, _surroundings, _switches):
-        found.extend(look(cartpole))
-    return found
+    if cartpole.poles > 1:
+        return [several_poles(cartpole)]
+    region = free_region(cartpole)
+    named = [*region.blocked, *_turning_slider(cartpole)]
+    effects = [*_joints(cartpole), *_actuator(cartpole), *_ties(cartpole), *_surroundings(cartpole)]
+    named += [phrase for _, phrase in effects]
+    if region.blocked or (named and not effects):
+        return named
+    try:
+        p = read_parameters(cartpole)
+    except ModelError as error:
+        return [*named, str(error)]
+    known = {kind for kind, _ in effects}
+    unknown = unexplained_forces(cartpole, p, region)
+    # Passive forces are the sum of several kinds, of which each is looked at.
+    if {"qfrc_passive"} < set(unknown):
+        known.add("qfrc_passive")
+    return named + [phrase for kind, phrase in unknown.items() if kind not in known]
 
 
-def beyond_step(cartpole: CartPole) -> list[str]:
-    """Why one step of the file's own integrator is not the semi-implicit `equations.step`.
+def beyond_step(cartpole: CartPole, method: str = "Euler") -> list[str]:
+    """Why one step of the file's own integrator is not that of a method of the equations.
+
+    Args:
+        cartpole: The model.
+        method: One of `file_steps.METHODS`.
 
     Returns:
-        One phrase each; empty for MuJoCo's `Euler` with implicit damping and for `implicitfast`,
-        which leaves out what turns with the velocity and so is the same here.
+        One phrase; none where the steps are the same, as those of two methods are where little
+        turns or brakes.
     """
-    model, names = cartpole.model, mujoco.mjtIntegrator
-    integrator, found = names(int(model.opt.integrator)), []
-    if integrator not in {names.mjINT_EULER, names.mjINT_IMPLICITFAST}:
-        found.append(f"integrator {integrator.name.removeprefix('mjINT_')} instead of Euler")
-    damped = model.dof_damping.any() or model.actuator_damping.any()
-    explicit = not _on(model, mujoco.mjtDisableBit.mjDSBL_EULERDAMP)
-    if integrator == names.mjINT_EULER and damped and explicit:
-        found.append("implicit damping (eulerdamp) switched off")
-    return found
+    named = f"integrator {method_of(cartpole)} instead of {method}"
+    if cartpole.poles > 1 or beyond_equations(cartpole):
+        return [] if cartpole.integrator in {"Euler", "implicitfast", method} else [named]
+    if _steps_as(cartpole, method):
+        return []
+    if cartpole.integrator == "discrete":
+        return ["friction that the integrator discrete solves in its own way"]
+    return [named]
+
+
+def _steps_as(cartpole: CartPole, method: str) -> bool:
+    p, rng, region = read_parameters(cartpole), np.random.default_rng(0), free_region(cartpole)
+    low, high = region.box(_BOX)
+    states = rng.uniform(low, high, (_STEPS, 4))
+    states = states[region.holds_for_a_step(states, p)]
+    actions = rng.integers(2, size=len(states))
+    simulation = Simulation(with_options(cartpole), "mujoco")
+    simulation.model.opt.tolerance = 0.0
+    found = simulation.steps(states, np.array(cartpole.controls)[actions])
+    expected = file_step(p, states, np.array(p.forces)[actions], method)
+    scale = np.maximum(1.0, np.abs(expected).max(axis=0, initial=0.0))
+    return bool((np.abs(found - expected) <= _SAME_STEP * scale).all())
 
 
 def overridden_masses(cartpole: CartPole) -> list[str]:
@@ -81,163 +128,112 @@ def overridden_masses(cartpole: CartPole) -> list[str]:
     ]
 
 
-def _poles(cartpole: CartPole) -> Iterator[str]:
+def differs_from(cartpole: CartPole, reference: Parameters = CARTPOLE_V1) -> list[str]:
+    """All by which a model moves differently from a reference, one phrase each."""
     if cartpole.poles > 1:
-        yield several_poles(cartpole)
+        return beyond_equations(cartpole) + beyond_step(cartpole)
+    try:
+        found = [deviation.phrase for deviation in deviations(cartpole, reference)]
+    except ModelError as error:
+        found = [str(error)]
+    region = free_region(cartpole)
+    met = [] if region.covers_task or region.blocked else region.bounds
+    return [*found, *met, *beyond_equations(cartpole), *beyond_step(cartpole)]
 
 
-def _directions(cartpole: CartPole) -> Iterator[str]:
-    """Tilted axes, and poles that do not stand at angle 0."""
-    slider = joint_label(cartpole.model, cartpole.slider)
-    if abs(axes_of(cartpole).slider[2]) > TILT:
-        yield f"slide axis of {slider} is tilted, not horizontal"
-    for pole in range(cartpole.poles):
-        yield from _directions_of(cartpole, pole, slider)
+def idle_numbers(cartpole: CartPole) -> list[str]:
+    """Numbers in a model of one pole that no episode feels, whatever was meant by them.
 
-
-def _directions_of(cartpole: CartPole, pole: int, slider: str) -> Iterator[str]:
-    model, axes, joint = cartpole.model, axes_of(cartpole, pole), cartpole.hinges[pole]
-    hinge = joint_label(model, joint)
-    if abs(axes.hinge[2]) > TILT:
-        yield f"hinge axis of {hinge} is tilted, not horizontal"
-    if abs(axes.hinge @ axes.slider) > TILT:
-        yield f"hinge axis of {hinge} is not perpendicular to the slide axis of {slider}"
-    same_body = model.jnt_bodyid[cartpole.slider] == model.jnt_bodyid[joint]
-    if same_body and joint < cartpole.slider:
-        yield f"slide axis of {slider} turns with the pole: {hinge} comes first in the same body"
-    com = axes.pole_frame @ pole_of(cartpole, pole).com
-    beside = float(com @ axes.slider)
-    if abs(beside) > TILT * np.abs(com).max():
-        ref = float(model.qpos0[joint])
-        reason = f" (its ref is {ref:g} rad)" if ref else ""
-        yield (
-            f"the pole's centre of mass is {abs(beside):.3g} m beside {hinge} at angle 0{reason}"
-        )
-
-
-def _joints(cartpole: CartPole) -> Iterator[str]:
-    """Limits, friction loss, springs and damping that is not viscous."""
-    model, bit = cartpole.model, mujoco.mjtDisableBit
-    solver = _on(model, bit.mjDSBL_CONSTRAINT)
+    Returns:
+        One phrase each.
+    """
+    model, bit, region = cartpole.model, mujoco.mjtDisableBit, free_region(cartpole)
+    found = list(region.bounds) if region.covers_task else []
     for joint in cartpole.joints:
         name = joint_label(model, joint)
-        low, high = model.jnt_range[joint]
-        limited = model.jnt_limited[joint] and np.isfinite([low, high]).any()
-        if limited and solver and _on(model, bit.mjDSBL_LIMIT):
-            yield f"limit of {name} at {low:g} and {high:g}"
-        if model.dof_frictionloss[joint] and solver and _on(model, bit.mjDSBL_FRICTIONLOSS):
-            yield f"friction loss in {name}"
-        spring = model.jnt_stiffness[joint] or model.jnt_stiffnesspoly[joint].any()
-        if spring and _on(model, bit.mjDSBL_SPRING):
-            yield f"spring (stiffness) in {name}"
-        if model.dof_dampingpoly[joint].any() and _on(model, bit.mjDSBL_DAMPER):
-            yield f"damping of {name} is not proportional to the velocity"
+        if model.dof_damping[joint] and not is_on(model, bit.mjDSBL_DAMPER):
+            found.append(f"damping of {name}, switched off by an option flag")
+    if not is_on(model, bit.mjDSBL_GRAVITY) and model.opt.gravity.any():
+        found.append("gravity, switched off by an option flag")
+    return found + overridden_masses(cartpole)
 
 
-def _actuator(cartpole: CartPole) -> Iterator[str]:
-    """Whatever makes the actuator more than a motor: force = gear * gain * control."""
-    model = cartpole.model
-    name = label(model, mujoco.mjtObj.mjOBJ_ACTUATOR, 0)
-    if model.actuator_gaintype[0] != mujoco.mjtGain.mjGAIN_FIXED:
-        yield f"gain of {name} is not fixed"
-    if model.actuator_biastype[0] != mujoco.mjtBias.mjBIAS_NONE and model.actuator_biasprm.any():
-        yield f"bias (servo, velocity feedback) of {name}"
-    if model.actuator_dyntype[0] != mujoco.mjtDyn.mjDYN_NONE:
-        yield f"activation dynamics of {name}"
-    if model.actuator_delay[0] > 0:
-        yield f"delay of {name}"
-    if model.actuator_dampingpoly[0].any():
-        yield f"damping of {name} is not proportional to the velocity"
-    if model.opt.disableactuator >> int(model.actuator_group[0]) & 1:
-        yield f"{name} is in a disabled group"
-    forces = np.array(cartpole.controls) * model.actuator_gainprm[0, 0]
-    if model.actuator_forcelimited[0] and _clips(model.actuator_forcerange[0], forces):
-        yield f"force range of {name} clips its force"
-    slider, pushes = cartpole.slider, np.array(forces_of(cartpole))
-    if model.jnt_actfrclimited[slider] and _clips(model.jnt_actfrcrange[slider], pushes):
-        yield f"actuator force range of {joint_label(model, slider)} clips the force of {name}"
+def _turning_slider(cartpole: CartPole) -> Iterator[str]:
+    model, joint = cartpole.model, cartpole.hinges[0]
+    if model.jnt_bodyid[cartpole.slider] == model.jnt_bodyid[joint] and joint < cartpole.slider:
+        slider, hinge = (joint_label(model, each) for each in (cartpole.slider, joint))
+        yield f"slide axis of {slider} turns with the pole: {hinge} comes first in the same body"
 
 
-def _clips(interval: Vector, forces: Vector) -> bool:
-    return bool((np.clip(forces, *interval) != forces).any())
-
-
-def _contacts(cartpole: CartPole) -> Iterator[str]:
-    """Pairs of geoms that may touch, by MuJoCo's filters; a fixed pair counts as it stands."""
+def _joints(cartpole: CartPole) -> Iterator[Effect]:
+    """Springs, damping that is not viscous, and dry friction that is not solved exactly."""
     model, bit = cartpole.model, mujoco.mjtDisableBit
-    if not (_on(model, bit.mjDSBL_CONTACT) and _on(model, bit.mjDSBL_CONSTRAINT)):
+    exact = model.opt.solver == mujoco.mjtSolver.mjSOL_NEWTON
+    constrained = is_on(model, bit.mjDSBL_CONSTRAINT) and is_on(model, bit.mjDSBL_FRICTIONLOSS)
+    for joint in cartpole.joints:
+        name = joint_label(model, joint)
+        if model.dof_frictionloss[joint] and constrained and not exact:
+            solver = mujoco.mjtSolver(int(model.opt.solver)).name.removeprefix("mjSOL_")
+            yield "qfrc_constraint", f"friction loss in {name} by the solver {solver}"
+        spring = model.jnt_stiffness[joint] or model.jnt_stiffnesspoly[joint].any()
+        if spring and is_on(model, bit.mjDSBL_SPRING):
+            yield "qfrc_spring", f"spring (stiffness) in {name}"
+        if model.dof_dampingpoly[joint].any() and is_on(model, bit.mjDSBL_DAMPER):
+            yield "qfrc_damper", f"damping of {name} is not proportional to the velocity"
+
+
+def _actuator(cartpole: CartPole) -> Iterator[Effect]:
+    """Whatever makes the motor more than a force, or a brake in proportion to the velocity."""
+    model, motor = cartpole.model, cartpole.motor
+    if not can_push(cartpole):
         return
-    weld = model.body_weldid[model.geom_bodyid].tolist()
-    moves = np.isin(model.geom_bodyid, moving_bodies(cartpole)).tolist()
-    explicit = set(zip(model.pair_geom1.tolist(), model.pair_geom2.tolist(), strict=True))
-    for a in range(model.ngeom):
-        for b in range(a + 1, model.ngeom):
-            if weld[a] == weld[b] or not (moves[a] or moves[b]):
-                continue
-            if {(a, b), (b, a)} & explicit or _may_collide(model, a, b):
-                names = [label(model, mujoco.mjtObj.mjOBJ_GEOM, geom, "") for geom in (a, b)]
-                yield f"contact between geoms {' and '.join(names)}"
+    name = label(model, mujoco.mjtObj.mjOBJ_ACTUATOR, motor)
+    affine = model.actuator_biastype[motor] == mujoco.mjtBias.mjBIAS_AFFINE
+    if affine and model.actuator_biasprm[motor, 1]:
+        yield "qfrc_actuator", f"spring (a servo's feedback of the position) of {name}"
+    if affine and model.actuator_biasprm[motor, 2]:
+        if model.actuator_forcelimited[motor] or model.jnt_actfrclimited[cartpole.slider]:
+            yield "qfrc_actuator", f"a force range that may clip the velocity feedback of {name}"
+        if model.actuator_biasprm[motor, 2] > 0:
+            yield "qfrc_actuator", f"velocity feedback of {name} that speeds the cart up"
+    if model.actuator_delay[motor] > 0:
+        yield "qfrc_actuator", f"delay of {name}"
+    if model.actuator_dampingpoly[motor].any():
+        yield "qfrc_damper", f"damping of {name} is not proportional to the velocity"
 
 
-def _may_collide(model: mujoco.MjModel, a: int, b: int) -> bool:
-    """MuJoCo's filter of two geoms on bodies that move apart: bit masks, parents, excludes."""
-    masks = model.geom_contype[a] & model.geom_conaffinity[b]
-    if not (masks or model.geom_contype[b] & model.geom_conaffinity[a]):
-        return False
-    bodies = sorted((int(model.geom_bodyid[a]), int(model.geom_bodyid[b])))
-    if (bodies[0] << 16) + bodies[1] in model.exclude_signature:
-        return False
-    weld = [int(model.body_weldid[body]) for body in bodies]
-    above = [int(model.body_weldid[model.body_parentid[body]]) for body in weld]
-    parent_filter = _on(model, mujoco.mjtDisableBit.mjDSBL_FILTERPARENT) and 0 not in weld
-    return not (parent_filter and (weld[0] == above[1] or weld[1] == above[0]))
-
-
-def _ties(cartpole: CartPole) -> Iterator[str]:
+def _ties(cartpole: CartPole) -> Iterator[Effect]:
     """Equality constraints, tendons, deformable things and plugins."""
     model, bit = cartpole.model, mujoco.mjtDisableBit
-    if _on(model, bit.mjDSBL_EQUALITY) and _on(model, bit.mjDSBL_CONSTRAINT):
+    if is_on(model, bit.mjDSBL_EQUALITY) and is_on(model, bit.mjDSBL_CONSTRAINT):
         for index in np.flatnonzero(model.eq_active0).tolist():
-            yield f"equality constraint {label(model, mujoco.mjtObj.mjOBJ_EQUALITY, index, '')}"
+            name = label(model, mujoco.mjtObj.mjOBJ_EQUALITY, index, "")
+            yield "qfrc_constraint", f"equality constraint {name}"
     acting = ("stiffness", "stiffnesspoly", "damping", "dampingpoly", "frictionloss", "armature")
     for tendon in range(model.ntendon):
         values = [getattr(model, f"tendon_{name}")[tendon] for name in (*acting, "limited")]
         if any(np.any(value) for value in values):
-            yield label(model, mujoco.mjtObj.mjOBJ_TENDON, tendon)
+            yield "qfrc_spring", label(model, mujoco.mjtObj.mjOBJ_TENDON, tendon)
     for flex in range(model.nflex):
-        yield label(model, mujoco.mjtObj.mjOBJ_FLEX, flex)
+        yield "qfrc_passive", label(model, mujoco.mjtObj.mjOBJ_FLEX, flex)
     for plugin in sorted({*model.body_plugin.tolist(), *model.actuator_plugin.tolist()} - {-1}):
-        yield label(model, mujoco.mjtObj.mjOBJ_PLUGIN, plugin)
+        yield "qfrc_passive", label(model, mujoco.mjtObj.mjOBJ_PLUGIN, plugin)
 
 
-def _surroundings(cartpole: CartPole) -> Iterator[str]:
-    """Gravity that is not plain, and air or water."""
+def _surroundings(cartpole: CartPole) -> Iterator[Effect]:
+    """Bodies without weight, air or water, and sleep."""
     model = cartpole.model
-    gravity = model.opt.gravity
-    if np.abs(gravity[:2]).max() > TILT * abs(gravity[2]):
-        yield f"gravity is not vertical ({' '.join(f'{value:g}' for value in gravity)})"
+    weighs = model.opt.gravity.any() and is_on(model, mujoco.mjtDisableBit.mjDSBL_GRAVITY)
     for body in moving_bodies(cartpole):
-        if model.body_gravcomp[body]:
-            yield f"gravity compensation of {label(model, mujoco.mjtObj.mjOBJ_BODY, body)}"
+        if model.body_gravcomp[body] and weighs:
+            name = label(model, mujoco.mjtObj.mjOBJ_BODY, body)
+            yield "qfrc_gravcomp", f"gravity compensation of {name}"
     for name in ("density", "viscosity"):
         if getattr(model.opt, name):
             wind = " and wind" if model.opt.wind.any() else ""
-            yield f"a fluid around it (option {name} {getattr(model.opt, name):g}{wind})"
-
-
-def _switches(cartpole: CartPole) -> Iterator[str]:
-    """Option flags that keep a part of the equations from acting."""
-    model, bit = cartpole.model, mujoco.mjtDisableBit
-    damped = model.dof_damping.any() or model.actuator_damping.any()
-    if model.opt.gravity.any() and not _on(model, bit.mjDSBL_GRAVITY):
-        yield "gravity is switched off (option flag)"
-    if damped and not _on(model, bit.mjDSBL_DAMPER):
-        yield "damping is switched off (option flag)"
-    if not _on(model, bit.mjDSBL_ACTUATION):
-        yield "actuation is switched off (option flag)"
+            yield (
+                "qfrc_fluid",
+                f"a fluid around it (option {name} {getattr(model.opt, name):g}{wind})",
+            )
     if model.opt.enableflags & int(mujoco.mjtEnableBit.mjENBL_SLEEP):
-        yield "sleeping of what is at rest (option flag)"
-
-
-def _on(model: mujoco.MjModel, flag: mujoco.mjtDisableBit) -> bool:
-    return not model.opt.disableflags & int(flag)
+        yield "", "sleeping of what is at rest (option flag)"

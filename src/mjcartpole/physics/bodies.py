@@ -3,6 +3,7 @@
 from typing import Protocol
 
 import mujoco
+import numpy as np
 
 
 class HasJoints(Protocol):
@@ -53,6 +54,16 @@ def pole_bodies(parts: HasJoints, pole: int = 0) -> list[int]:
     ]
     upper = {body for other in above for body in _under(parts, other)}
     return [body for body in whole if body not in upper]
+
+
+def farthest_from_origin(parts: HasJoints) -> float:
+    """How far what moves stands from the world's origin when all coordinates are 0, m."""
+    data = mujoco.MjData(parts.model)
+    data.qpos[:] = 0.0
+    mujoco.mj_kinematics(parts.model, data)
+    joints = [parts.slider, *parts.hinges]
+    places = np.concatenate([data.xipos[moving_bodies(parts)], data.xanchor[joints]])
+    return float(np.abs(places).max())
 
 
 def mass_of(model: mujoco.MjModel, bodies: list[int]) -> float:

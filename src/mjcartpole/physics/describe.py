@@ -8,11 +8,10 @@ import mujoco
 import numpy as np
 
 from mjcartpole import task
-from mjcartpole.errors import ModelError
 from mjcartpole.physics.beyond import beyond_equations, beyond_step
 from mjcartpole.physics.bodies import cart_bodies, mass_of, pole_bodies
+from mjcartpole.physics.file_steps import method_of
 from mjcartpole.physics.model import CartPole
-from mjcartpole.physics.parameters import read_parameters
 from mjcartpole.physics.structure import LEAST_ARM, Directions, Vector, directions, is_servo, push
 
 _LABEL_WIDTH: Final = 12
@@ -187,15 +186,15 @@ def describe(cartpole: CartPole) -> Description:
         gravity=tuple(model.opt.gravity.tolist()),
         forces=(low, high),
         servo=is_servo(model),
-        gear=float(model.actuator_gear[0, 0]),
+        gear=float(model.actuator_gear[cartpole.motor, 0]),
         controls=cartpole.controls,
         timestep=cartpole.timestep,
         substeps=cartpole.substeps,
         integrator=cartpole.integrator,
         cart_mass=mass_of(model, cart_bodies(cartpole)),
         rail_limits=(limits[0], limits[1]) if has_ends else None,
-        beyond=_beyond(cartpole, found[0]),
-        beyond_step=tuple(beyond_step(cartpole)),
+        beyond=tuple(beyond_equations(cartpole)),
+        beyond_step=tuple(beyond_step(cartpole, method_of(cartpole))),
     )
 
 
@@ -216,19 +215,6 @@ def axis_name(axis: Vector) -> str:
     if abs(axis[index]) > 1 - _NOTHING:
         return f"{'+' if axis[index] > 0 else '-'}{'xyz'[index]}"
     return f"({_numbers(axis)})"
-
-
-def _beyond(cartpole: CartPole, found: Directions) -> tuple[str, ...]:
-    """What keeps the equations from covering a model; they have z up."""
-    reasons = beyond_equations(cartpole)
-    try:
-        if cartpole.poles == 1:
-            read_parameters(cartpole)
-    except ModelError as error:
-        reasons.append(str(error))
-    if not found.up[2] and not reasons:
-        reasons.append(f"up is {axis_name(found.up)}, not z")
-    return tuple(reasons)
 
 
 def _joint(model: mujoco.MjModel, joint: int) -> str:

@@ -13,18 +13,13 @@ from typing import Final
 
 import numpy as np
 
-from mjcartpole.errors import ConfigError, ModelError
+from mjcartpole.errors import ConfigError
 from mjcartpole.physics.addresses import find_element, known_attributes, label_of
-from mjcartpole.physics.beyond import beyond_equations, beyond_step
 from mjcartpole.physics.document import Document, Element
-from mjcartpole.physics.equations import CARTPOLE_V1, Parameters
 from mjcartpole.physics.meaning import MEANINGS, apply_meanings, meaning_of, names_like
-from mjcartpole.physics.model import CartPole
-from mjcartpole.physics.parameters import differences, read_parameters
 from mjcartpole.physics.parts import number_text
 from mjcartpole.physics.schema import attributes_of, did_you_mean
 from mjcartpole.physics.schema import tags as schema_tags
-from mjcartpole.physics.structure import directions
 
 EDIT_NAMES: Final[dict[str, str]] = {
     name: f"{meaning.text} ({meaning.unit})" for name, meaning in MEANINGS.items()
@@ -71,7 +66,14 @@ def edits_of(edits: Mapping[str, object] | Sequence[str]) -> dict[str, object]:
     if isinstance(edits, Mapping):
         return dict(edits)
     found: dict[str, object] = {}
-    for key, value in map(parse_edit, [edits] if isinstance(edits, str) else edits):
+    texts = [edits] if isinstance(edits, str) or not isinstance(edits, Iterable) else edits
+    for text in texts:
+        if not isinstance(text, str):
+            raise ConfigError(
+                'edits are one mapping such as {"pole.length": 1.5}, or texts such as '
+                f'"pole.length=1.5", not {text!r}'
+            )
+        key, value = parse_edit(text)
         if key in found:
             raise ConfigError(f"{key!r} is edited twice; give one value")
         found[key] = value
@@ -149,25 +151,6 @@ def describe_edits(before: str, after: str) -> list[str]:
             if was != now:
                 lines.append(f"{label_of(b)}.{name}: {was or 'nothing'} → {now or 'nothing'}")
     return lines
-
-
-def differs_from(cartpole: CartPole, reference: Parameters = CARTPOLE_V1) -> list[str]:
-    """All by which a model moves differently from a reference, one phrase each."""
-    return (
-        _other_parameters(cartpole, reference) + beyond_equations(cartpole) + beyond_step(cartpole)
-    )
-
-
-def _other_parameters(cartpole: CartPole, reference: Parameters) -> list[str]:
-    """By which numbers of the equations a model differs, where it has these at all."""
-    if cartpole.poles > 1:
-        return []
-    if not directions(cartpole).up[2]:
-        return ["up is not z"]
-    try:
-        return differences(read_parameters(cartpole), reference)
-    except ModelError as error:
-        return [str(error)]
 
 
 def _apply_elements(document: Document, edits: Mapping[str, object]) -> None:

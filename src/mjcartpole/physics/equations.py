@@ -1,17 +1,23 @@
-r"""The cart-pole in closed form, for any planar rigid pole: what the engine is held against.
+r"""The cart-pole in closed form, for any rigid pole on a rail: what the engine is held against.
 
-The state is `(x, x_dot, theta, theta_dot)`: m, m/s, rad, rad/s. Theta is 0 upright. The pole's
-centre of mass stands at `(x + s l sin(theta), l cos(theta))`, with `s = 1` where a positive angle
-leans to +x. Its kinetic and potential energy, with armatures J_c and J_p,
+The state is `(x, x_dot, theta, theta_dot)`: m, m/s, rad, rad/s. Seen along the hinge's axis, the
+pole's centre of mass stands at `l (sin(theta + phi), cos(theta + phi))` from the hinge, the second
+number upwards, with phi the angle by which it leans at theta = 0. A push along the rail moves the
+hinge by `(lambda, nu)` in that plane: `(s, 0)` where rail and axis are level and square to each
+other, with `s = 1` where a positive angle leans to +x. With
 
-    T = 1/2 (M + m + J_c) x_dot^2 + s m l cos(theta) x_dot theta_dot
-        + 1/2 (I + m l^2 + J_p) theta_dot^2
-    V = m g l cos(theta)
+    C(theta) = m l (lambda cos(theta + phi) - nu sin(theta + phi))
 
-give by Lagrange's equations, with the push F and viscous damping b_c, b_p,
+and armatures J_c and J_p, the kinetic and potential energy
 
-    (M + m + J_c) x_acc + s m l cos(theta) theta_acc = F - b_c x_dot + s m l sin(theta) theta_dot^2
-    s m l cos(theta) x_acc + (I + m l^2 + J_p) theta_acc = m g l sin(theta) - b_p theta_dot
+    T = 1/2 (M + m + J_c) x_dot^2 + C x_dot theta_dot + 1/2 (I + m l^2 + J_p) theta_dot^2
+    V = (M + m) g sin(tau) x + m g cos(eta) l cos(theta + phi)
+
+with tau and eta the tilts of rail and axis, give by Lagrange's equations, with the push F, viscous
+damping b_c, b_p, and dry friction R_c, R_p, the motor's own b_m counted in b_c,
+
+    (M + m + J_c) x_acc + C theta_acc = F + R_c - b_c x_dot - C' theta_dot^2 - (M + m) g sin(tau)
+    C x_acc + (I + m l^2 + J_p) theta_acc = m g cos(eta) l sin(theta + phi) + R_p - b_p theta_dot
 
 which Cramer's rule solves. With I = m l^2 / 3, a uniform thin rod of length 2 l, and nothing else,
 this is what CartPole-v1 computes: Barto, Sutton and Anderson (1983), doi:10.1109/TSMC.1983.6313077,
@@ -32,6 +38,7 @@ import numpy.typing as npt
 from mjcartpole import task
 from mjcartpole.errors import ConfigError
 from mjcartpole.integrator import Integrator, check_integrator
+from mjcartpole.physics.dry_friction import DryFriction, friction_forces
 
 Number: TypeAlias = float | npt.NDArray[np.float64]
 """A float or an array of them."""
@@ -47,17 +54,25 @@ class Parameters:
     Attributes:
         cart_mass: M, kg: all that slides and does not rotate.
         pole_mass: m, kg: all that rotates.
-        com_distance: l, m, from the hinge up to the pole's centre of mass at angle 0; negative
-            for a pole that hangs there.
+        com_distance: l, m, from the hinge's axis to the pole's centre of mass; negative for a pole
+            that hangs at angle 0.
         inertia: I, kg m^2, of the pole about its centre of mass.
-        gravity: g, m/s^2, positive downwards.
+        gravity: g, m/s^2; up is against it.
         slider_damping: b_c, N s/m.
         hinge_damping: b_p, N m s/rad.
+        motor_damping: b_m, N s/m: how much the motor brakes the cart, by feeding back its velocity.
         slider_armature: J_c, kg: inertia that resists x_dot and has no weight.
         hinge_armature: J_p, kg m^2: inertia that resists theta_dot and has no weight.
         forces: Push on the cart along +x in N, by action 0 and by action 1.
         timestep: h, s: one physics step.
         hinge_sign: s: 1 if a positive angle leans the pole to +x, -1 if to -x.
+        rail_tilt: tau, rad: how much the rail rises towards +x.
+        hinge_tilt: eta, rad: how much the hinge's axis rises from the horizontal.
+        skew: rad: how far the rail leaves the plane in which the pole turns.
+        lean: phi, rad: how far the pole's centre of mass leans, as a positive angle does, at
+            angle 0.
+        slider_friction: Of the cart's joint, N; None without.
+        hinge_friction: Of the pole's joint, N m; None without.
     """
 
     cart_mass: float
@@ -67,18 +82,26 @@ class Parameters:
     gravity: float
     slider_damping: float = 0.0
     hinge_damping: float = 0.0
+    motor_damping: float = 0.0
     slider_armature: float = 0.0
     hinge_armature: float = 0.0
     forces: tuple[float, float] = (-10.0, 10.0)
     timestep: float = task.CONTROL_STEP
     hinge_sign: int = 1
+    rail_tilt: float = 0.0
+    hinge_tilt: float = 0.0
+    skew: float = 0.0
+    lean: float = 0.0
+    slider_friction: DryFriction | None = None
+    hinge_friction: DryFriction | None = None
 
     def __post_init__(self) -> None:
         """Refuse numbers that no cart-pole has.
 
         Raises:
             ConfigError: A value is not finite, a mass, inertia, armature or damping is negative,
-                the pole or the timestep is nothing, or the sign is neither 1 nor -1.
+                the pole or the timestep is nothing, the sign is neither 1 nor -1, or no push
+                along the rail could turn the pole.
         """
         for name in ("cart_mass", "inertia", *_FRICTION_AND_ARMATURE):
             _check(name, getattr(self, name), getattr(self, name) >= 0, "0 or more")
@@ -86,14 +109,33 @@ class Parameters:
             _check(name, getattr(self, name), getattr(self, name) > 0, "more than 0")
         for name in ("com_distance", "gravity"):
             _check(name, getattr(self, name), True, "finite")
+        for name in ("rail_tilt", "hinge_tilt", "skew", "lean"):
+            _check(
+                name, getattr(self, name), abs(getattr(self, name)) <= math.pi / 2, "at most pi/2"
+            )
+        within = abs(self._rise) < math.cos(self.skew)
+        _check("rail tilt", self.rail_tilt, within, "an angle at which a push turns the pole")
         for force in self.forces:
             _check("forces", force, True, "finite")
         _check("hinge_sign", self.hinge_sign, self.hinge_sign in {-1, 1}, "1 or -1")
+
+    @property
+    def _rise(self) -> float:
+        """Nu: how much of a push goes up in the plane in which the pole turns."""
+        rise = math.sin(self.rail_tilt) - math.sin(self.hinge_tilt) * math.sin(self.skew)
+        return rise / math.cos(self.hinge_tilt)
+
+    @property
+    def directions(self) -> tuple[float, float]:
+        """Lambda and nu: a push along the rail in the plane of the pole, horizontal and up."""
+        level = math.sqrt(math.cos(self.skew) ** 2 - self._rise**2)
+        return self.hinge_sign * level, self._rise
 
 
 _FRICTION_AND_ARMATURE: Final = (
     "slider_damping",
     "hinge_damping",
+    "motor_damping",
     "slider_armature",
     "hinge_armature",
 )
@@ -142,21 +184,27 @@ CARTPOLE_V1: Final = uniform_rod()
 
 
 class Coefficients(NamedTuple):
-    """What the two equations are made of; Numba compiles code that takes it.
+    """What the two equations are made of: C = coupling cos(theta) - crossing sin(theta).
 
     Attributes:
         slider_inertia: M + m + J_c, kg.
-        coupling: s m l, kg m.
+        coupling: kg m; s m l where nothing is tilted.
+        crossing: kg m; 0 where nothing is tilted.
         hinge_inertia: I + m l^2 + J_p, kg m^2.
-        weight: m g l, N m.
-        slider_damping: b_c, N s/m.
+        weight: N m, by the sine of theta: m g l where nothing is tilted.
+        leaning: N m, by the cosine of theta: 0 where nothing is tilted.
+        pull: Gravity's along the rail, N.
+        slider_damping: b_c + b_m, N s/m.
         hinge_damping: b_p, N m s/rad.
     """
 
     slider_inertia: float
     coupling: float
+    crossing: float
     hinge_inertia: float
     weight: float
+    leaning: float
+    pull: float
     slider_damping: float
     hinge_damping: float
 
@@ -170,25 +218,33 @@ def coefficients(p: Parameters, implicit_damping: float = 0.0) -> Coefficients:
             (M + h D) v_next = M v + h f, D on the diagonal, is the same as a mass matrix
             M + h D with the damping force of the old velocities. MuJoCo's Euler does that.
     """
-    moment = p.pole_mass * p.com_distance
+    moment, mass = p.pole_mass * p.com_distance, p.cart_mass + p.pole_mass
+    level, rise = p.directions
+    sin, cos = math.sin(p.lean), math.cos(p.lean)
+    torque = moment * p.gravity * math.cos(p.hinge_tilt)
     return Coefficients(
-        slider_inertia=p.cart_mass
-        + p.pole_mass
-        + p.slider_armature
-        + implicit_damping * p.slider_damping,
-        coupling=p.hinge_sign * moment,
+        slider_inertia=mass + p.slider_armature + implicit_damping * p.slider_damping,
+        coupling=moment * (level * cos - rise * sin),
+        crossing=moment * (level * sin + rise * cos),
         hinge_inertia=p.inertia
         + moment * p.com_distance
         + p.hinge_armature
         + implicit_damping * p.hinge_damping,
-        weight=moment * p.gravity,
-        slider_damping=p.slider_damping,
+        weight=torque * cos,
+        leaning=torque * sin,
+        pull=-mass * p.gravity * math.sin(p.rail_tilt),
+        slider_damping=p.slider_damping + p.motor_damping,
         hinge_damping=p.hinge_damping,
     )
 
 
 def solve(
-    k: Coefficients, x_dot: Number, theta: Number, theta_dot: Number, force: Number
+    k: Coefficients,
+    x_dot: Number,
+    theta: Number,
+    theta_dot: Number,
+    force: Number,
+    torque: Number = 0.0,
 ) -> tuple[Number, Number]:
     """Both accelerations, by Cramer's rule (equations and source: see the module).
 
@@ -197,46 +253,67 @@ def solve(
         x_dot: m/s, any shape that broadcasts with the others.
         theta: rad.
         theta_dot: rad/s.
-        force: F, N.
+        force: What acts along the rail beside damping and gravity, N.
+        torque: What acts on the hinge beside damping and gravity, N m.
 
     Returns:
         `(x_acc, theta_acc)`: m/s^2, rad/s^2, of the broadcast shape.
     """
     sin, cos = np.sin(theta), np.cos(theta)
-    coupled = k.coupling * cos
-    push = force - k.slider_damping * x_dot + k.coupling * sin * theta_dot * theta_dot
-    torque = k.weight * sin - k.hinge_damping * theta_dot
+    coupled = k.coupling * cos - k.crossing * sin
+    swing = (k.coupling * sin + k.crossing * cos) * theta_dot * theta_dot
+    push = force + k.pull - k.slider_damping * x_dot + swing
+    turn = k.weight * sin + k.leaning * cos - k.hinge_damping * theta_dot + torque
     determinant = k.slider_inertia * k.hinge_inertia - coupled * coupled
-    x_acc = (k.hinge_inertia * push - coupled * torque) / determinant
-    theta_acc = (k.slider_inertia * torque - coupled * push) / determinant
+    x_acc = (k.hinge_inertia * push - coupled * turn) / determinant
+    theta_acc = (k.slider_inertia * turn - coupled * push) / determinant
     return x_acc, theta_acc
+
+
+def _pushes(
+    p: Parameters, x_dot: Number, theta: Number, theta_dot: Number, force: Number
+) -> tuple[Number, Number]:
+    """What acts on slider and hinge beside damping and gravity: the push, and dry friction."""
+    if p.slider_friction is None and p.hinge_friction is None:
+        return force, 0.0
+    k = coefficients(p)
+    smooth = solve(k, x_dot, theta, theta_dot, force)
+    coupled = k.coupling * np.cos(theta) - k.crossing * np.sin(theta)
+    slider, hinge = friction_forces(
+        (p.slider_friction, p.hinge_friction),
+        (k.slider_inertia, coupled, k.hinge_inertia),
+        (x_dot, theta_dot),
+        smooth,
+    )
+    return force + slider, hinge
 
 
 def accelerations(
     p: Parameters, x_dot: Number, theta: Number, theta_dot: Number, force: Number
 ) -> tuple[Number, Number]:
     """`(x_acc, theta_acc)` of a cart-pole in m/s^2 and rad/s^2; see `solve` for the arguments."""
-    return solve(coefficients(p), x_dot, theta, theta_dot, force)
+    pushes = _pushes(p, x_dot, theta, theta_dot, force)
+    return solve(coefficients(p), x_dot, theta, theta_dot, *pushes)
 
 
 def energy(p: Parameters, state: npt.ArrayLike) -> Array:
     """Kinetic and potential energy together, J, shape (...,); the pole weighs nothing at the hinge.
 
-    Constant where nothing pushes or brakes.
+    Constant where nothing pushes or brakes. The cart has none of its own at x = 0.
 
     Args:
         p: The cart-pole.
         state: Shape (..., 4).
     """
     k = coefficients(p)
-    _, x_dot, theta, theta_dot = _split(state)
-    cos = np.cos(theta)
+    x, x_dot, theta, theta_dot = _split(state)
+    sin, cos = np.sin(theta), np.cos(theta)
     kinetic = (
         0.5 * k.slider_inertia * x_dot * x_dot
-        + k.coupling * cos * x_dot * theta_dot
+        + (k.coupling * cos - k.crossing * sin) * x_dot * theta_dot
         + 0.5 * k.hinge_inertia * theta_dot * theta_dot
     )
-    return np.asarray(kinetic + k.weight * cos)
+    return np.asarray(kinetic + k.weight * cos - k.leaning * sin - k.pull * x)
 
 
 def derivative(p: Parameters, state: npt.ArrayLike, force: npt.ArrayLike) -> Array:
@@ -278,7 +355,9 @@ def step(
     x, x_dot, theta, theta_dot = _split(state)
     explicit = integrator == "gym"
     k = coefficients(p, implicit_damping=0.0 if explicit else h)
-    x_acc, theta_acc = solve(k, x_dot, theta, theta_dot, np.asarray(force))
+    # MuJoCo finds dry friction before it makes damping implicit.
+    pushes = _pushes(p, x_dot, theta, theta_dot, np.asarray(force))
+    x_acc, theta_acc = solve(k, x_dot, theta, theta_dot, *pushes)
     x_dot_next, theta_dot_next = x_dot + h * x_acc, theta_dot + h * theta_acc
     if explicit:
         return _join(x + h * x_dot, x_dot_next, theta + h * theta_dot, theta_dot_next)
@@ -303,59 +382,6 @@ def rk4_step(
     k3 = derivative(p, s + h / 2 * k2, force)
     k4 = derivative(p, s + h * k3, force)
     return np.asarray(s + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4))
-
-
-def linearisation(p: Parameters) -> tuple[Array, Array]:
-    """A and B of `state_dot = A state + B force` near rest at angle 0.
-
-    Returns:
-        A, shape (4, 4), and B, shape (4, 1); SI units.
-    """
-    return _linear(coefficients(p))
-
-
-def _linear(k: Coefficients) -> tuple[Array, Array]:
-    mass = np.array([[k.slider_inertia, k.coupling], [k.coupling, k.hinge_inertia]])
-    # Columns: what x_dot, theta, theta_dot and the force do to the two right-hand sides.
-    right = np.array([[-k.slider_damping, 0.0, 0.0, 1.0], [0.0, k.weight, -k.hinge_damping, 0.0]])
-    effect = np.linalg.solve(mass, right)
-    a = np.zeros((4, 4))
-    a[0, 1] = a[2, 3] = 1.0
-    a[1, 1:], a[3, 1:] = effect[:, :3]
-    b = np.zeros((4, 1))
-    b[1::2, 0] = effect[:, 3]
-    return a, b
-
-
-def step_matrix(p: Parameters, integrator: Integrator = "gym", h: float | None = None) -> Array:
-    """Jacobian of one `step` near rest at angle 0, shape (4, 4); see `step` for the arguments.
-
-    Raises:
-        ConfigError: The integrator is unknown.
-    """
-    check_integrator(integrator)
-    h = p.timestep if h is None else h
-    explicit = integrator == "gym"
-    a, _ = _linear(coefficients(p, implicit_damping=0.0 if explicit else h))
-    if explicit:
-        return np.asarray(np.eye(4) + h * a)
-    move, kick = np.eye(4), np.eye(4)
-    move[0, 1] = move[2, 3] = h
-    kick[1::2] += h * a[1::2]
-    return np.asarray(move @ kick)
-
-
-def spectral_radius(p: Parameters, integrator: Integrator = "gym", h: float | None = None) -> float:
-    """How much one step multiplies a small error near rest at angle 0, in the long run.
-
-    The largest absolute eigenvalue of `step_matrix`; see `step` for the arguments. The cart's
-    position makes a double eigenvalue 1, so a pole that hangs, where nothing grows, gives 1 to
-    about eight digits.
-
-    Raises:
-        ConfigError: The integrator is unknown.
-    """
-    return float(np.abs(np.linalg.eigvals(step_matrix(p, integrator, h))).max())
 
 
 def _split(state: npt.ArrayLike) -> tuple[Array, Array, Array, Array]:

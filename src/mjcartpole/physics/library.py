@@ -1,6 +1,10 @@
-"""Where MuJoCo's own library lies, for compiled code that calls it."""
+"""MuJoCo's own library: where it lies, for compiled code that calls it, and how it writes."""
 
+import contextlib
+import ctypes
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Final
 
 import mujoco
 
@@ -12,3 +16,27 @@ def libmujoco() -> Path | None:
         for path in sorted(folder.glob(pattern)):
             return path
     return None
+
+
+_ENOUGH: Final = 17
+"""Digits that tell every float64 from its neighbours."""
+
+
+@contextlib.contextmanager
+def all_digits() -> Iterator[None]:
+    """Have MuJoCo write documents with all digits of its numbers, where its library can.
+
+    Its own are six, and the document then compiles to another model than the one that it is of.
+    """
+    try:
+        library = ctypes.CDLL(str(libmujoco()))
+        usual = library._mjPRIVATE__get_xml_precision()
+        write = library._mjPRIVATE__set_xml_precision
+    except (OSError, AttributeError):
+        yield
+        return
+    write(_ENOUGH)
+    try:
+        yield
+    finally:
+        write(usual)

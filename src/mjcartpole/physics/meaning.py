@@ -206,23 +206,22 @@ def _joint_value(cartpole: CartPole, joint: int, name: str) -> float:
 
 def _edit_force(parts: Parts, cartpole: CartPole, force: float) -> None:
     """Through the gear, which is what force there is per unit of control."""
-    model = cartpole.model
+    model, motor = cartpole.model, cartpole.motor
     left, right = forces_of(cartpole)
-    fixed = model.actuator_gaintype[0] == mujoco.mjtGain.mjGAIN_FIXED
-    if not fixed or model.actuator_biastype[0] != mujoco.mjtBias.mjBIAS_NONE:
+    fixed = model.actuator_gaintype[motor] == mujoco.mjtGain.mjGAIN_FIXED
+    if not fixed or model.actuator_biastype[motor] != mujoco.mjtBias.mjBIAS_NONE:
         raise ConfigError("force cannot be set: the actuator is no plain motor; edit it by name")
     if left != -right or right == 0:
         raise ConfigError(
             f"force cannot be set: the actions push with {left:g} N and {right:g} N, not equally "
             "to both sides; set the actuator's gear and ctrlrange"
         )
-    gear = math.copysign(
-        force / abs(right / float(model.actuator_gear[0, 0])), float(model.actuator_gear[0, 0])
-    )
-    element = parts.actuator()
+    before = float(model.actuator_gear[motor, 0])
+    gear = math.copysign(force / abs(right / before), before)
+    element = parts.actuator(motor)
     tokens = element.attributes.get("gear", "").split() or [""]
     tokens[0] = number_text(gear, tokens[0])
-    if "gear" in element.attributes or gear != float(model.actuator_gear[0, 0]):
+    if "gear" in element.attributes or gear != before:
         parts.document.set(element, "gear", " ".join(tokens))
 
 

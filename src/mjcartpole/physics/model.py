@@ -7,17 +7,21 @@ that pushes along the slider. Names do not matter; structure does.
 import copy
 import dataclasses
 import difflib
+import functools
 import os
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeAlias
+from typing import Final, TypeAlias
 
 import mujoco
 import numpy as np
 
 from mjcartpole import task
 from mjcartpole.errors import ConfigError, ModelNotFoundError, ModelSyntaxError
+from mjcartpole.physics.cache import remembered
+from mjcartpole.physics.library import all_digits
 from mjcartpole.physics.reading import read_text, stand_alone
 from mjcartpole.physics.soundness import check_motion, check_numbers
 from mjcartpole.physics.structure import (
@@ -28,13 +32,19 @@ from mjcartpole.physics.structure import (
     find_controls,
     find_joints,
     find_substeps,
+    motor_of,
 )
 
-INTEGRATORS = ("Euler", "RK4", "implicit", "implicitfast")
-"""As MJCF spells them, in the order of MuJoCo's mjtIntegrator."""
+INTEGRATORS = {
+    int(value): {"EULER": "Euler", "RK4": "RK4"}.get(
+        name := key.removeprefix("mjINT_"), name.lower()
+    )
+    for key, value in mujoco.mjtIntegrator.__members__.items()
+}
+"""MuJoCo's integrators by its own numbers, spelled as MJCF spells them."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class CartPole:
     """A compiled cart-pole and where its parts are.
 
@@ -59,6 +69,10 @@ class CartPole:
     substeps: int
     upright: tuple[float, ...]
 
+    def __repr__(self) -> str:
+        name = self.name if len(self.name) <= 200 else f"{self.name[:200]}…"
+        return f"CartPole({name!r}, {task.in_words(self.poles)}, timestep {self.timestep:g} s)"
+
     @property
     def poles(self) -> int:
         """How many poles it has."""
@@ -70,9 +84,19 @@ class CartPole:
         return (self.slider, *self.hinges)
 
     @property
+    def motor(self) -> int:
+        """Index of the actuator that the actions control."""
+        return motor_of(self.model)
+
+    @property
     def timestep(self) -> float:
         """Seconds of one physics step."""
         return float(self.model.opt.timestep)
+
+    @property
+    def has_own_timestep(self) -> bool:
+        """Whether a control step is one physics step of another length than 0.02 s."""
+        return self.substeps == 1 and self.timestep != task.CONTROL_STEP
 
     @property
     def control_step(self) -> float:
@@ -82,8 +106,11 @@ class CartPole:
     @property
     def integrator(self) -> str:
         """The integrator that the file names, as MJCF spells it (see `INTEGRATORS`)."""
-        return INTEGRATORS[int(self.model.opt.integrator)]
+        return str(INTEGRATORS[int(self.model.opt.integrator)])
 
+
+_NAMES_FILE: Final = re.compile(r"file\w*\s*=")
+"""In the text of a document that depends on other files: includes, meshes, attached models."""
 
 ModelLike: TypeAlias = str | os.PathLike[str] | mujoco.MjSpec | CartPole
 """What `load_model` takes: a name, a path, an XML document, an MjSpec, or a loaded cart-pole."""
@@ -93,6 +120,7 @@ Edits: TypeAlias = Mapping[str, object] | Sequence[str] | None
 """Changes of a document: a mapping, or texts such as "pole.length=1.5"."""
 
 
+@functools.cache
 def models_folder() -> Path:
     """The folder of the models that come with the package.
 
@@ -119,7 +147,7 @@ def load_model(
     Args:
         source: The name of a shipped model (`"cartpole"`), the path of an MJCF file, an MJCF
             document as text (it starts with `<`), or an `mujoco.MjSpec`. A loaded cart-pole is
-            returned as it is.
+            returned as it is, but for `edits` and `own_timestep`.
         edits: Changes of the document, made before it is compiled (see `edit_document`): a
             mapping, or texts such as "pole.length=1.5".
         own_timestep: Let a control step be one physics step of the file, however long, instead of
@@ -129,19 +157,32 @@ def load_model(
         ModelNotFoundError: There is no such name or file.
         ModelSyntaxError: MuJoCo does not accept the document.
         NotACartPoleError: It compiles, but is no cart-pole.
-        ConfigError: An edit makes no sense.
+        ConfigError: An edit makes no sense, or the document is not all that the model is.
     """
+    shared = load_shared(source, edits, own_timestep=own_timestep)
+    return shared if isinstance(source, CartPole) and not edits else own_copy(shared)
+
+
+def load_shared(
+    source: ModelLike = "cartpole", edits: Edits = None, *, own_timestep: bool = False
+) -> CartPole:
+    """As `load_model`, for those who only read: a document's compiled model is shared by all."""
     if edits:
         return _load_edited(source, edits, own_timestep)
     if isinstance(source, CartPole):
-        return source
+        return dataclasses.replace(source, substeps=1) if own_timestep else source
     if isinstance(source, mujoco.MjSpec):
         return _find_parts(*_from_spec(source), own_timestep)
     if isinstance(source, str) and source.lstrip().startswith("<"):
-        return load_named(source, "the XML document", own_timestep=own_timestep)
+        return _load_text(source, "the XML document", own_timestep)
     path = find_model(source)
     name = path.stem if path.parent == models_folder() else str(source)
-    return _find_parts(name, *_from_file(path), own_timestep)
+    return _load_text(read_text(path), name, own_timestep, path)
+
+
+def own_copy(cartpole: CartPole) -> CartPole:
+    """The same cart-pole with a compiled model of its own, which may be changed."""
+    return dataclasses.replace(cartpole, model=copy.copy(cartpole.model))
 
 
 def _load_edited(
@@ -149,14 +190,30 @@ def _load_edited(
 ) -> CartPole:
     from mjcartpole.physics.edit import edit_document, edits_of  # noqa: PLC0415 - it needs CartPole
 
-    if isinstance(source, mujoco.MjSpec):
-        raise ConfigError("edits change a document; an MjSpec is changed by its own attributes")
     # An edit may be what makes a file's timestep fit.
-    base = load_model(source, own_timestep=True)
+    base = load_shared(source, own_timestep=True)
+    if isinstance(source, CartPole | mujoco.MjSpec):
+        _check_document(base)
     changes = edits_of(edits)
     document = edit_document(base.xml, changes, base.name)
     what = ", ".join(f"{key}={value}" for key, value in changes.items())
-    return load_named(document, f"{base.name} with {what}", own_timestep=own_timestep)
+    return _load_text(document, f"{base.name} with {what}", own_timestep)
+
+
+def _check_document(cartpole: CartPole) -> None:
+    """Edits are made in a document, so it must be all that the compiled model is."""
+    if not is_its_document(cartpole):
+        raise ConfigError(
+            f"{cartpole.name} cannot be edited: its document compiles to another model, since its "
+            "numbers were changed after compiling or MuJoCo wrote it with fewer digits; edit the "
+            "file, or the MjSpec, that it comes from and load that"
+        )
+
+
+def is_its_document(cartpole: CartPole) -> bool:
+    """Whether the document compiles to the very model that runs."""
+    again = _load_text(cartpole.xml, cartpole.name, own_timestep=True)
+    return same_model(again.model, cartpole.model)
 
 
 def load_named(document: str, name: str, *, own_timestep: bool = True) -> CartPole:
@@ -165,7 +222,32 @@ def load_named(document: str, name: str, *, own_timestep: bool = True) -> CartPo
     Raises:
         ModelError: It does not load, or is no cart-pole.
     """
-    return _find_parts(name, *_from_text(document, name), own_timestep)
+    return own_copy(_load_text(document, name, own_timestep))
+
+
+def _load_text(text: str, name: str, own_timestep: bool, path: Path | None = None) -> CartPole:
+    """Load a document as it was written, of a file or of none; shared if it names no other file."""
+    if _NAMES_FILE.search(text):
+        return _load_with_files(text, name, own_timestep, path)
+    found = remembered(
+        (text, own_timestep),
+        lambda: _find_parts(
+            name, stand_alone(text, name, Path()), _compile(text, name), own_timestep
+        ),
+    )
+    return dataclasses.replace(found, name=name)
+
+
+def _load_with_files(
+    text: str, name: str, own_timestep: bool, path: Path | None = None
+) -> CartPole:
+    """Load a document with includes, meshes and the like: beside its file, or the program."""
+    folder = path.parent if path else Path()
+    xml = stand_alone(text, name if path is None else str(path), folder)
+    # By a relative path MuJoCo does not find all files of included files, and the compiled model
+    # holds the paths of its files.
+    whole = path.parent.resolve() / path.name if path else None
+    return _find_parts(name, xml, _compile(xml, name, whole), own_timestep)
 
 
 def with_options(
@@ -179,13 +261,13 @@ def with_options(
     Args:
         cartpole: The cart-pole.
         timestep: Seconds.
-        integrator: As MJCF spells it: Euler, RK4, implicit or implicitfast.
+        integrator: As MJCF spells it (see `INTEGRATORS`).
     """
     model = copy.copy(cartpole.model)
     if timestep is not None:
         model.opt.timestep = timestep
     if integrator is not None:
-        model.opt.integrator = INTEGRATORS.index(integrator)
+        model.opt.integrator = next(n for n, name in INTEGRATORS.items() if name == integrator)
     return dataclasses.replace(cartpole, model=model, substeps=1)
 
 
@@ -218,28 +300,15 @@ def find_model(source: str | os.PathLike[str]) -> Path:
     )
 
 
-def _from_file(path: Path) -> tuple[str, mujoco.MjModel]:
-    """The document, whole, and the compiled model."""
-    xml = stand_alone(read_text(path), str(path), path.parent)
-    # By a relative path MuJoCo does not find all files of included files, and the compiled model
-    # holds the paths of its files.
-    return xml, _compile(xml, str(path), path.parent.resolve() / path.name)
-
-
-def _from_text(text: str, name: str) -> tuple[str, mujoco.MjModel]:
-    """The document, whole, and the compiled model; its files are sought where the program runs."""
-    xml = stand_alone(text, name, Path())
-    return xml, _compile(xml, name)
-
-
 def _from_spec(spec: mujoco.MjSpec) -> tuple[str, str, mujoco.MjModel]:
     """Its name, the document and the compiled model."""
     try:
         model = spec.compile()
     except (ValueError, mujoco.FatalError) as error:
         raise ModelSyntaxError(f"the MjSpec does not compile: {_one_line(error)}") from error
-    # MuJoCo writes numbers with six digits: this text is for reading, `model` is what runs.
-    xml = stand_alone(spec.to_xml(), "the MjSpec", Path(spec.modelfiledir))
+    with all_digits():
+        text = spec.to_xml()
+    xml = stand_alone(text, "the MjSpec", Path(spec.modelfiledir))
     return spec.modelname or "the MjSpec", xml, model
 
 
@@ -248,7 +317,8 @@ def _compile(text: str, name: str, path: Path | None = None) -> mujoco.MjModel:
     try:
         if path is None:
             return mujoco.MjModel.from_xml_string(text)
-        return mujoco.MjModel.from_xml_path(str(path))
+        # As bytes: a name need not be text.
+        return mujoco.MjModel.from_xml_path(os.fsencode(path))
     except (ValueError, mujoco.FatalError) as error:
         raise ModelSyntaxError(f"{name} is not a valid MJCF: {_one_line(error)}") from error
 

@@ -1,12 +1,14 @@
 """The parameters of the equations, read from a compiled model.
 
-`read_parameters` takes the file's numbers; `beyond.py` names everything else that acts on the
+`read_parameters` takes the numbers that act; `beyond.py` names everything else that acts on the
 motion.
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass, fields
-from typing import Final
+import copy
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, fields, replace
+from typing import Final, NamedTuple
 
 import mujoco
 import numpy as np
@@ -15,13 +17,13 @@ import numpy.typing as npt
 from mjcartpole import task
 from mjcartpole.errors import ModelError, NotACartPoleError
 from mjcartpole.physics.bodies import cart_bodies, mass_of, pole_bodies
+from mjcartpole.physics.dry_friction import DryFriction
 from mjcartpole.physics.equations import Parameters
 from mjcartpole.physics.model import CartPole
+from mjcartpole.physics.structure import directions, push
 
 TILT: Final = 1e-14
 """Sine of an angle that rounding alone can leave between two axes; anything more is a tilt."""
-
-UP: Final = np.array([0.0, 0.0, 1.0])
 
 Vector = npt.NDArray[np.float64]
 
@@ -29,9 +31,9 @@ Vector = npt.NDArray[np.float64]
 def read_parameters(cartpole: CartPole) -> Parameters:
     """The numbers that the equations need, from a compiled model.
 
-    They are the file's own, also where an option flag keeps one of them from acting. All bodies
-    below the hinge count as one rigid pole, all others below the slider as the cart. A motor's
-    armature and damping act through its gear, so their share goes with the gear squared.
+    They are those that act: what an option flag of the file switches off is 0. All bodies below
+    the hinge count as one rigid pole, all others below the slider as the cart. A motor's armature
+    and damping act through its gear, so their share goes with the gear squared.
 
     Raises:
         NotACartPoleError: The pole has no mass.
@@ -41,35 +43,155 @@ def read_parameters(cartpole: CartPole) -> Parameters:
     if cartpole.poles > 1:
         raise ModelError(f"{cartpole.name} has {several_poles(cartpole)}")
     model, slider, hinge = cartpole.model, cartpole.slider, cartpole.hinges[0]
-    pole, axes = pole_of(cartpole), axes_of(cartpole)
+    pole = pole_of(cartpole)
     if pole.mass <= 0:
         name = joint_label(model, hinge)
         raise NotACartPoleError(f"{cartpole.name}: the pole, {name}, has no mass")
-    gear = float(model.actuator_gear[0, 0])
+    bit, motor = mujoco.mjtDisableBit, cartpole.motor
+    gear_squared = float(model.actuator_gear[motor, 0]) ** 2
+    damper = is_on(model, bit.mjDSBL_DAMPER)
+    frictions = _frictions(cartpole)
+    gravity = float(np.linalg.norm(model.opt.gravity)) if is_on(model, bit.mjDSBL_GRAVITY) else 0.0
     try:
         return Parameters(
             cart_mass=mass_of(model, cart_bodies(cartpole)),
             pole_mass=pole.mass,
-            com_distance=float(axes.pole_frame[2] @ pole.com),
             inertia=pole.inertia,
-            gravity=0.0 - float(model.opt.gravity[2]),
-            slider_damping=float(model.dof_damping[slider] + gear**2 * model.actuator_damping[0]),
-            hinge_damping=float(model.dof_damping[hinge]),
+            gravity=gravity,
+            slider_damping=damper
+            * float(model.dof_damping[slider] + gear_squared * model.actuator_damping[motor]),
+            hinge_damping=damper * float(model.dof_damping[hinge]),
+            motor_damping=feedback_of(cartpole),
             slider_armature=float(
-                model.dof_armature[slider] + gear**2 * model.actuator_armature[0]
+                model.dof_armature[slider] + gear_squared * model.actuator_armature[motor]
             ),
             hinge_armature=float(model.dof_armature[hinge]),
-            forces=forces_of(cartpole),
+            forces=_acting_forces(cartpole),
             timestep=float(model.opt.timestep),
-            hinge_sign=-1 if np.cross(axes.hinge, UP) @ axes.slider < 0 else 1,
+            slider_friction=frictions.get(slider),
+            hinge_friction=frictions.get(hinge),
+            **geometry_of(cartpole)._asdict(),
         )
     except ValueError as error:
         raise ModelError(f"{cartpole.name} is beyond the equations: {error}") from error
 
 
+def is_on(model: mujoco.MjModel, flag: mujoco.mjtDisableBit) -> bool:
+    """Whether a model's option flags leave something switched on."""
+    return not model.opt.disableflags & int(flag)
+
+
+def can_push(cartpole: CartPole) -> bool:
+    """Whether the motor acts, by the file's flags."""
+    model = cartpole.model
+    group = int(model.actuator_group[cartpole.motor])
+    enabled = not (0 <= group < 31 and model.opt.disableactuator >> group & 1)
+    return enabled and is_on(model, mujoco.mjtDisableBit.mjDSBL_ACTUATION)
+
+
+def feedback_of(cartpole: CartPole) -> float:
+    """How much the motor itself brakes the cart, N s/m: velocity feedback."""
+    model, motor = cartpole.model, cartpole.motor
+    if model.actuator_biastype[motor] != mujoco.mjtBias.mjBIAS_AFFINE or not can_push(cartpole):
+        return 0.0
+    gear = float(model.actuator_gear[motor, 0])
+    return 0.0 - gear**2 * float(model.actuator_biasprm[motor, 2])
+
+
+def _acting_forces(cartpole: CartPole) -> tuple[float, float]:
+    """Push along the slider by either action at rest at x = 0, after all that clips it, N."""
+    if not can_push(cartpole):
+        return 0.0, 0.0
+    left, right = (push(cartpole.model, cartpole.slider, control) for control in cartpole.controls)
+    return left, right
+
+
+def _frictions(cartpole: CartPole) -> dict[int, DryFriction]:
+    """Dry friction by joint, with the softness that MuJoCo's constraint solver gives it."""
+    # As explicit Euler and the other integrators solve it; `discrete` has its own way.
+    model = copy.copy(cartpole.model)
+    model.opt.integrator = mujoco.mjtIntegrator.mjINT_EULER
+    data = mujoco.MjData(model)
+    data.qpos[:] = 0.0
+    mujoco.mj_fwdPosition(model, data)
+    mujoco.mj_fwdVelocity(model, data)
+    kind = int(mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF)
+    return {
+        int(data.efc_id[row]): DryFriction(
+            loss=float(data.efc_frictionloss[row]),
+            softness=float(data.efc_R[row]),
+            rate=float(data.efc_KBIP[row, 1]),
+        )
+        for row in range(data.nefc)
+        if data.efc_type[row] == kind
+    }
+
+
+class _Geometry(NamedTuple):
+    """The parameters that say where the axes and the pole point."""
+
+    com_distance: float
+    hinge_sign: int
+    rail_tilt: float
+    hinge_tilt: float
+    skew: float
+    lean: float
+
+
+def geometry_of(cartpole: CartPole, up: Vector | None = None) -> _Geometry:
+    """Angles between rail, hinge, pole and what is up; what rounding alone can make is 0.
+
+    Args:
+        cartpole: A model of one pole.
+        up: Unit, shape (3,); against gravity if None.
+    """
+    axes, up = axes_of(cartpole), _up(cartpole) if up is None else up
+    hinge_tilt = _angle(axes.hinge, up)
+    # In the plane in which the pole turns: up, and where a positive angle leans.
+    high = up - (axes.hinge @ up) * axes.hinge
+    high /= np.linalg.norm(high)
+    aside = np.cross(axes.hinge, high)
+    com = axes.pole_frame @ pole_of(cartpole).com
+    above, beside = float(com @ high), float(com @ aside)
+    lean = math.atan2(beside, above) if above >= 0 else math.atan2(-beside, -above)
+    distance = above
+    if abs(beside) > TILT * abs(above):
+        distance = math.copysign(math.hypot(above, beside), above)
+    else:
+        lean = 0.0
+    return _Geometry(
+        com_distance=distance,
+        hinge_sign=-1 if axes.slider @ aside < 0 else 1,
+        rail_tilt=_angle(axes.slider, up),
+        hinge_tilt=hinge_tilt,
+        skew=_angle(axes.slider, axes.hinge),
+        lean=lean,
+    )
+
+
+def _angle(axis: Vector, other: Vector) -> float:
+    """Between an axis and the plane that is square to another, rad."""
+    sine = float(axis @ other)
+    return 0.0 if abs(sine) < TILT else math.asin(min(max(sine, -1.0), 1.0))
+
+
+def _up(cartpole: CartPole) -> Vector:
+    """Against gravity, unit, shape (3,); without gravity the world axis that counts as up."""
+    gravity = cartpole.model.opt.gravity
+    if not gravity.any():
+        return directions(cartpole).up
+    up: Vector = -gravity / np.linalg.norm(gravity)
+    return up
+
+
 def several_poles(cartpole: CartPole) -> str:
     """Why the equations do not cover a model with several poles."""
     return f"{task.in_words(cartpole.poles)}, and the equations are those of one"
+
+
+def take(p: Parameters, other: Parameters, names: Iterable[str]) -> Parameters:
+    """Return `p` with some of another's parameters."""
+    return replace(p, **{name: getattr(other, name) for name in names})
 
 
 def differences(p: Parameters, q: Parameters, rtol: float = 1e-12) -> list[str]:
@@ -93,10 +215,15 @@ def differences(p: Parameters, q: Parameters, rtol: float = 1e-12) -> list[str]:
 def _values(p: Parameters) -> Iterator[tuple[str, float]]:
     for field in fields(p):
         value = getattr(p, field.name)
+        label = field.name.replace("_", " ")
         if field.name == "forces":
             yield from ((f"force of action {i}", force) for i, force in enumerate(value))
+        elif field.name.endswith("friction"):
+            for part in fields(DryFriction):
+                number = getattr(value, part.name) if value else 0.0
+                yield label if part.name == "loss" else f"{label}'s {part.name}", number
         else:
-            yield field.name.replace("_", " "), value
+            yield label, value
 
 
 def _digits(value: float, other: float) -> str:
@@ -180,7 +307,8 @@ def _rotation(quaternion: Vector) -> Vector:
 def forces_of(cartpole: CartPole) -> tuple[float, float]:
     """Push along the slider by action 0 and by action 1, N."""
     model = cartpole.model
-    gear, gain = float(model.actuator_gear[0, 0]), float(model.actuator_gainprm[0, 0])
+    motor = cartpole.motor
+    gear, gain = float(model.actuator_gear[motor, 0]), float(model.actuator_gainprm[motor, 0])
     left, right = cartpole.controls
     return gear * (gain * left), gear * (gain * right)
 

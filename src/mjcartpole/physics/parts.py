@@ -77,10 +77,10 @@ class Parts:
             )
         return [(first + i, element) for i, element in enumerate(elements)]
 
-    def actuator(self) -> Element:
-        """The element of the only actuator."""
+    def actuator(self, index: int) -> Element:
+        """The element of an actuator, by its number in the compiled model."""
         sections = [child for child in self.document.root.children if child.tag == "actuator"]
-        return next(child for section in sections for child in section.children)
+        return [child for section in sections for child in section.children][index]
 
     def inertial(self, model: mujoco.MjModel, body: int) -> Element | None:
         """The <inertial> that decides a body's mass; None where geoms do."""

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from mjcartpole.errors import ConfigError
 from mjcartpole.physics.bodies import cart_bodies, mass_of, pole_bodies
-from mjcartpole.physics.document import Element
+from mjcartpole.physics.document import Document, Element
 from mjcartpole.physics.model import CartPole
 from mjcartpole.physics.parameters import pole_of
 from mjcartpole.physics.parts import Parts, numbers_of
@@ -173,10 +173,8 @@ def set_length(parts: Parts, cartpole: CartPole, length: float, pole: int = 0) -
     Raises:
         ConfigError: The pole cannot be stretched; the reason is said.
     """
-    model, hinge = cartpole.model, cartpole.hinges[pole]
-    root, com = int(model.jnt_bodyid[hinge]), pole_of(cartpole, pole).com
-    rod, stretch = _RodInertial.of(parts, cartpole, pole), _Stretch(parts, model, hinge, com, root)
-    stretch.old = rod.length if rod else stretch.reach()
+    model, root = cartpole.model, int(cartpole.model.jnt_bodyid[cartpole.hinges[pole]])
+    rod, stretch = _measured(parts, cartpole, pole)
     stretch.new = length
     inertial = parts.inertial(model, root)
     if rod is not None:
@@ -191,6 +189,26 @@ def set_length(parts: Parts, cartpole: CartPole, length: float, pole: int = 0) -
             if "pos" in element.attributes:
                 parts.put(element, "pos", stretch.point(numbers_of(element, "pos")))
     return stretch.new / stretch.old
+
+
+def length_of(cartpole: CartPole, pole: int = 0) -> float:
+    """A pole's length, hinge to tip, m, as `set_length` has it.
+
+    Raises:
+        ConfigError: The document does not show it; the reason is said.
+    """
+    return _measured(Parts(Document(cartpole.xml)), cartpole, pole)[1].old
+
+
+def _measured(
+    parts: Parts, cartpole: CartPole, pole: int
+) -> "tuple[_RodInertial | None, _Stretch]":
+    """A pole's rod, if it is one, and a stretch that knows how long the pole is."""
+    model, hinge = cartpole.model, cartpole.hinges[pole]
+    root, com = int(model.jnt_bodyid[hinge]), pole_of(cartpole, pole).com
+    rod, stretch = _RodInertial.of(parts, cartpole, pole), _Stretch(parts, model, hinge, com, root)
+    stretch.old = rod.length if rod else stretch.reach()
+    return rod, stretch
 
 
 class _Stretch:

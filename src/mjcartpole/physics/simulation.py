@@ -45,16 +45,28 @@ class Simulation:
             ConfigError: The integrator is unknown.
         """
         check_integrator(integrator)
-        self.cartpole = cartpole
-        self.integrator = integrator
-        self.model = stepping_model(cartpole.model, integrator)
-        self.data = mujoco.MjData(self.model)
+        self._take(cartpole, integrator, mujoco.MjData(stepping_model(cartpole.model, integrator)))
+
+    def _take(self, cartpole: CartPole, integrator: Integrator, data: mujoco.MjData) -> None:
+        self.cartpole, self.integrator = cartpole, integrator
+        self.model, self.data = data.model, data
         self.size = 2 * len(cartpole.joints)
         self._qpos, self._qvel = _floats(self.data.qpos), _floats(self.data.qvel)
         self._places = tuple(zip(range(0, self.size, 2), cartpole.joints, strict=True))
         self._timer = self.data.timer[int(mujoco.mjtTimer.mjTIMER_STEP)]
         make_step = _explicit_euler if integrator == "gym" else _own_integrator
         self.step: Callable[[float], State] = make_step(self.model, self.data, cartpole)
+
+    def __getstate__(self) -> tuple[CartPole, Integrator, mujoco.MjData]:
+        """What a copy needs to go on bit-equal: MuJoCo's data bring their model along."""
+        return self.cartpole, self.integrator, self.data
+
+    def __setstate__(self, state: tuple[CartPole, Integrator, mujoco.MjData]) -> None:
+        self._take(*state)
+
+    def __copy__(self) -> "Simulation":
+        """A copy in the same state that moves on its own."""
+        return copy.deepcopy(self)
 
     @property
     def state(self) -> npt.NDArray[np.float64]:
@@ -138,7 +150,7 @@ def stepping_model(model: mujoco.MjModel, integrator: Integrator) -> mujoco.MjMo
     disable = mujoco.mjtDisableBit
     stepped = copy.copy(model)
     stepped.opt.disableflags |= int(disable.mjDSBL_AUTORESET)
-    if _nothing_can_touch(model):
+    if nothing_can_touch(model):
         stepped.opt.disableflags |= int(disable.mjDSBL_CONTACT)
         if _nothing_else_constrains(model):
             stepped.opt.disableflags |= int(disable.mjDSBL_CONSTRAINT)
@@ -149,7 +161,7 @@ def stepping_model(model: mujoco.MjModel, integrator: Integrator) -> mujoco.MjMo
     return stepped
 
 
-def _nothing_can_touch(model: mujoco.MjModel) -> bool:
+def nothing_can_touch(model: mujoco.MjModel) -> bool:
     """Whether no two geoms of a model can ever be in contact, wherever they are."""
     pairs = np.bitwise_and.outer(model.geom_contype, model.geom_conaffinity)
     return not (pairs.any() or model.npair or model.nflex)
@@ -239,6 +251,20 @@ def _state_of(
     qpos: "memoryview[float]", qvel: "memoryview[float]", joints: tuple[int, ...]
 ) -> State:
     return tuple([value for joint in joints for value in (qpos[joint], qvel[joint])])
+
+
+def as_one_pole(step: Callable[[float], State]) -> Callable[[float], State]:
+    """Steps of several poles that return what the rules look at: the worst of all poles.
+
+    That is `(x, x_dot, theta, theta_dot)` with the largest angle and the largest angular velocity,
+    without signs.
+    """
+
+    def advance(control: float) -> State:
+        state = step(control)
+        return state[0], state[1], task.farthest(state[2::2]), task.farthest(state[3::2])
+
+    return advance
 
 
 def _gave_up(cartpole: CartPole, error: mujoco.FatalError) -> SimulationError:

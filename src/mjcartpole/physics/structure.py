@@ -106,9 +106,10 @@ def find_controls(name: str, model: mujoco.MjModel, slider: int) -> tuple[float,
         NotACartPoleError: There is not exactly one motor, or it cannot push in two ways.
     """
     _check_motor(name, model, slider)
-    low, high = -1.0, 1.0
-    if model.actuator_ctrllimited[0]:
-        low, high = (float(end) for end in model.actuator_ctrlrange[0])
+    motor, low, high = motor_of(model), -1.0, 1.0
+    control = int(model.actuator_ctrladr[motor])
+    if model.actuator_ctrllimited[control]:
+        low, high = (float(end) for end in model.actuator_ctrlrange[control])
     left, right = (push(model, slider, control) for control in (low, high))
     if left == right:
         raise refusal(
@@ -120,17 +121,23 @@ def find_controls(name: str, model: mujoco.MjModel, slider: int) -> tuple[float,
     return (low, high) if left < right else (high, low)
 
 
+def motor_of(model: mujoco.MjModel) -> int:
+    """Index of the actuator that takes the one control of a model (others may take none)."""
+    return int(np.flatnonzero(model.actuator_ctrlnum)[0])
+
+
 def push(model: mujoco.MjModel, slider: int, control: float) -> float:
     """Force along the slider by a control, N, after the limits that clip it.
 
     A servo's (`is_servo`) is that at rest at x = 0.
     """
-    force = float(model.actuator_gainprm[0, 0]) * control
-    if model.actuator_biastype[0] != mujoco.mjtBias.mjBIAS_NONE:
-        force += float(model.actuator_biasprm[0, 0])
-    if model.actuator_forcelimited[0]:
-        force = float(np.clip(force, *model.actuator_forcerange[0]))
-    force *= float(model.actuator_gear[0, 0])
+    motor = motor_of(model)
+    force = float(model.actuator_gainprm[motor, 0]) * control
+    if model.actuator_biastype[motor] != mujoco.mjtBias.mjBIAS_NONE:
+        force += float(model.actuator_biasprm[motor, 0])
+    if model.actuator_forcelimited[motor]:
+        force = float(np.clip(force, *model.actuator_forcerange[motor]))
+    force *= float(model.actuator_gear[motor, 0])
     if model.jnt_actfrclimited[slider]:
         force = float(np.clip(force, *model.jnt_actfrcrange[slider]))
     return force
@@ -138,11 +145,13 @@ def push(model: mujoco.MjModel, slider: int, control: float) -> float:
 
 def _check_motor(name: str, model: mujoco.MjModel, slider: int) -> None:
     if model.nu != 1:
-        amount = f"{model.nu} actuators" if model.nu else "no actuator"
+        idle = " with a control input" if model.nactuator > model.nu else ""
+        amount = f"{model.nu} actuators{idle}" if model.nu else f"no actuator{idle}"
         raise refusal(name, model, f"{amount} where one plain motor is needed")
-    transmission = mujoco.mjtTrn(int(model.actuator_trntype[0]))
+    motor = motor_of(model)
+    transmission = mujoco.mjtTrn(int(model.actuator_trntype[motor]))
     on_joint = transmission in {mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT}
-    if not on_joint or model.actuator_trnid[0, 0] != slider:
+    if not on_joint or model.actuator_trnid[motor, 0] != slider:
         word = transmission.name.removeprefix("mjTRN_").lower()
         what = "another joint" if on_joint else f"a {word}"
         raise refusal(
@@ -150,24 +159,28 @@ def _check_motor(name: str, model: mujoco.MjModel, slider: int) -> None:
             model,
             f"an actuator that does not push along the slide joint (it acts on {what})",
         )
-    if model.na or model.actuator_dyntype[0] != mujoco.mjtDyn.mjDYN_NONE:
-        kind = mujoco.mjtDyn(int(model.actuator_dyntype[0])).name.removeprefix("mjDYN_").lower()
+    if model.na or model.actuator_dyntype[motor] != mujoco.mjtDyn.mjDYN_NONE:
+        active = int(np.flatnonzero(model.actuator_actnum)[0]) if model.na else motor
+        kind = mujoco.mjtDyn(int(model.actuator_dyntype[active])).name
+        kind = kind.removeprefix("mjDYN_").lower()
         raise refusal(
             name, model, f"an actuator with activation states ({kind}) instead of a plain motor"
         )
-    if model.actuator_gaintype[0] != mujoco.mjtGain.mjGAIN_FIXED and not _is_fixed_gain(model):
+    fixed = model.actuator_gaintype[motor] == mujoco.mjtGain.mjGAIN_FIXED
+    if not fixed and not _is_fixed_gain(model, motor):
         raise refusal(name, model, "an actuator whose force is not in proportion to its control")
 
 
-def _is_fixed_gain(model: mujoco.MjModel) -> bool:
-    affine = model.actuator_gaintype[0] == mujoco.mjtGain.mjGAIN_AFFINE
-    return bool(affine and not model.actuator_gainprm[0, 1:3].any())
+def _is_fixed_gain(model: mujoco.MjModel, motor: int) -> bool:
+    affine = model.actuator_gaintype[motor] == mujoco.mjtGain.mjGAIN_AFFINE
+    return bool(affine and not model.actuator_gainprm[motor, 1:3].any())
 
 
 def is_servo(model: mujoco.MjModel) -> bool:
-    """Whether the actuator's force depends on more than its control: position or velocity."""
-    biased = model.actuator_biastype[0] != mujoco.mjtBias.mjBIAS_NONE
-    return bool(biased and model.actuator_biasprm[0, 1:3].any())
+    """Whether the motor's force depends on more than its control: position or velocity."""
+    motor = motor_of(model)
+    biased = model.actuator_biastype[motor] != mujoco.mjtBias.mjBIAS_NONE
+    return bool(biased and model.actuator_biasprm[motor, 1:3].any())
 
 
 def find_substeps(name: str, model: mujoco.MjModel) -> int:
@@ -346,9 +359,12 @@ def refusal(name: str, model: mujoco.MjModel, found: str) -> NotACartPoleError:
         f"{model.joint(index).name or 'unnamed'} ({_KIND[mujoco.mjtJoint(int(kind))]})"
         for index, kind in enumerate(model.jnt_type[:_SHOWN])
     ]
-    actuators = [model.actuator(index).name or "unnamed" for index in range(min(model.nu, _SHOWN))]
+    actuators = [
+        mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_ACTUATOR, index) or "unnamed"
+        for index in range(min(model.nactuator, _SHOWN))
+    ]
     joints += ["…"] * (model.njnt > _SHOWN)
-    actuators += ["…"] * (model.nu > _SHOWN)
+    actuators += ["…"] * (model.nactuator > _SHOWN)
     return NotACartPoleError(
         f"{name} is not a cart-pole: it has {found} "
         f"[joints: {', '.join(joints) or 'none'}; actuators: {', '.join(actuators) or 'none'}]; "

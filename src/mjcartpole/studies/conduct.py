@@ -1,10 +1,14 @@
 """From a training in progress to its results: written, evaluated, summarised."""
 
+import contextlib
 from pathlib import Path
 from typing import Any
 
+from mjcartpole.errors import RunError
 from mjcartpole.learning import runs, tensorboard
+from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.engine import Engine
+from mjcartpole.learning.policy import Policy
 from mjcartpole.learning.session import Session
 from mjcartpole.learning.training import TrainResult
 from mjcartpole.physics.model import CartPole
@@ -32,27 +36,38 @@ def conclude(
     """
     result = session.training.result()
     summary = _summary(result, preset=preset, interrupted=not session.is_over)
-    runs.write_results(folder, result, summary)
+    film = _film_of(folder)
+    runs.write_results(folder, result, {**summary, **film})
     if events:
         tensorboard.write_events(folder, result)
     if not session.is_over:
         return result, summary, None
-    evaluation = evaluate_where_trained(result, cartpole, session.training.engine)
-    summary["evaluation"] = evaluation.summary()
+    engine = session.training.engine
+    evaluation = evaluate_where_trained(result.policy, result.config, cartpole, engine)
+    summary |= {"evaluation": evaluation.summary(), **film}
     runs.write_summary(folder, summary)
     return result, summary, evaluation
 
 
-def evaluate_where_trained(result: TrainResult, cartpole: CartPole, engine: Engine) -> Evaluation:
-    """Play the greedy policy on the backend, model and integrator that it was trained on."""
-    config = result.config
+def evaluate_where_trained(
+    policy: Policy, config: TrainConfig, cartpole: CartPole, engine: Engine
+) -> Evaluation:
+    """Play a greedy policy on the backend, model and integrator that it was trained on."""
     return evaluate(
-        result.policy,
+        policy,
         backend=config.backend,
         model=cartpole if config.backend == "mujoco" else "cartpole",
         integrator=config.integrator,
         engine=engine,
     )
+
+
+def _film_of(folder: Path) -> dict[str, Any]:
+    """The film that this training had begun when it was stopped: it keeps its name."""
+    with contextlib.suppress(RunError):
+        summary = runs.read_summary(folder)
+        return {"video": summary["video"]} if "video" in summary else {}
+    return {}
 
 
 def _summary(result: TrainResult, *, preset: str, interrupted: bool) -> dict[str, Any]:

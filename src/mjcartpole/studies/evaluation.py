@@ -27,7 +27,7 @@ SEED: Final = 1_000_000
 PolicyLike = Callable[[npt.NDArray[np.float32]], int]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Evaluation:
     """Greedy episodes of one policy.
 
@@ -47,6 +47,16 @@ class Evaluation:
         return np.array([episode.total for episode in self.episodes])
 
     @property
+    def mean(self) -> float:
+        """Mean return."""
+        return float(self.returns.mean())
+
+    @property
+    def minimum(self) -> float:
+        """The least return."""
+        return float(self.returns.min())
+
+    @property
     def endings(self) -> dict[str, int]:
         """How many episodes ended in each way."""
         counts = Counter(episode.ending for episode in self.episodes)
@@ -58,10 +68,17 @@ class Evaluation:
             "backend": self.backend,
             "seed": self.seed,
             "episodes": len(self.episodes),
-            "mean": float(self.returns.mean()),
-            "minimum": float(self.returns.min()),
+            "mean": self.mean,
+            "minimum": self.minimum,
             "endings": self.endings,
         }
+
+    def __repr__(self) -> str:
+        played = f"{len(self.episodes)} episodes on {self.backend}, seed {self.seed}"
+        figures = (
+            f": mean return {self.mean:.2f}, minimum {self.minimum:g}" if self.episodes else ""
+        )
+        return f"Evaluation({played}{figures})"
 
 
 def evaluate(

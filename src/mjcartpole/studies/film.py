@@ -3,7 +3,7 @@
 import contextlib
 import functools
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
@@ -147,7 +147,7 @@ class Take:
 
     stage: Stage
     episode: Episode
-    states: npt.NDArray[np.float64]
+    states: npt.NDArray[np.float64] = field(repr=False)
 
     def places(self, look: Look) -> npt.NDArray[np.float64]:
         """Where in the episode each frame of a film lies, in control steps."""

@@ -50,6 +50,27 @@ def seed_folder(folder: Path, seed: int) -> Path:
     return folder / f"seed-{seed}"
 
 
+def is_seeds(path: Path) -> bool:
+    """Whether a path is a folder of many seeds."""
+    return (path / SEEDS).is_file()
+
+
+def learned_seeds(folder: Path) -> tuple[dict[int, Path], list[int]]:
+    """The runs of a folder of many seeds that have a policy, by seed, and the seeds without.
+
+    Raises:
+        RunError: There is no policy yet, or the folder is damaged.
+    """
+    runs_of = {seed: seed_folder(folder, seed) for seed in _load(folder).seeds}
+    learned = {seed: run for seed, run in runs_of.items() if (run / runs.POLICY).is_file()}
+    if not learned:
+        raise RunError(
+            f"no seed in '{folder}' has a policy yet; go on with "
+            f"`mjcartpole train --resume {folder}`"
+        )
+    return learned, [seed for seed in runs_of if seed not in learned]
+
+
 @contextlib.contextmanager
 def claimed_seeds(folder: Path, *, overwrite: bool = False) -> Iterator[None]:
     """Hold a folder for many seeds; see `claimed_folder`.
@@ -111,9 +132,9 @@ def write_seeds(folder: Path, many: ManyResult) -> None:
 def _csv(many: ManyResult) -> str:
     lines = ["seed,mean,minimum,failed"]
     for found in many.seeds:
-        figures = found.evaluation or {"mean": "", "minimum": ""}
-        failed = "yes" if found.error else "no"
-        lines.append(f"{found.seed},{figures['mean']},{figures['minimum']},{failed}")
+        evaluation, failed = found.evaluation, "yes" if found.error else "no"
+        figures = f"{evaluation.mean},{evaluation.minimum}" if evaluation else ","
+        lines.append(f"{found.seed},{figures},{failed}")
     return "\n".join(lines) + "\n"
 
 

@@ -6,12 +6,12 @@ import dataclasses
 import multiprocessing
 import os
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from multiprocessing.synchronize import Event
 from pathlib import Path
-from typing import Any
 
 from mjcartpole import task
 from mjcartpole.errors import ConfigError, MjCartPoleError, RunError
@@ -21,37 +21,42 @@ from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.engine import Engine, choose_engine
 from mjcartpole.learning.session import CHECKPOINT_EVERY, Session
 from mjcartpole.learning.training import Training, TrainResult
+from mjcartpole.physics.batch_simulation import available_cores
 from mjcartpole.physics.model import CartPole, load_model
 from mjcartpole.studies.conduct import conclude, evaluate_where_trained
+from mjcartpole.studies.evaluation import Evaluation
 from mjcartpole.studies.statistics import Aggregate, aggregate
 
 MAX_SEEDS = 100_000
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class SeedResult:
     """What one seed has come to.
 
     Attributes:
         seed: The seed.
-        evaluation: Figures of the greedy evaluation (see `Evaluation.summary`); None if the seed
-            failed or was stopped.
+        evaluation: The greedy evaluation; None if the seed failed or was stopped.
         result: What was learned; None if the seed failed, or was complete on disk before.
         error: Why it failed; empty if it did not.
     """
 
     seed: int
-    evaluation: dict[str, Any] | None = None
+    evaluation: Evaluation | None = None
     result: TrainResult | None = None
     error: str = ""
 
     @property
     def score(self) -> float | None:
         """Mean greedy return."""
-        return None if self.evaluation is None else float(self.evaluation["mean"])
+        return None if self.evaluation is None else self.evaluation.mean
+
+    def __repr__(self) -> str:
+        outcome = self.error or self.evaluation or "not finished"
+        return f"SeedResult({self.seed}: {outcome})"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class ManyResult:
     """What many seeds have come to.
 
@@ -78,6 +83,13 @@ class ManyResult:
         if not self.scores:
             return None
         return aggregate(self.scores, solved_at=task.REWARD_THRESHOLD)
+
+    def __repr__(self) -> str:
+        count, scores = len(self.seeds), self.scores
+        reached = (
+            f", mean {sum(scores) / len(scores):.2f}, least {min(scores):.2f}" if scores else ""
+        )
+        return f"ManyResult({len(scores)} of {count} seeds evaluated{reached})"
 
 
 @dataclass(frozen=True)
@@ -176,13 +188,15 @@ class Crew:
     def _in_processes(self, stop: Callable[[], bool]) -> Iterator[SeedResult | None]:
         # A fresh interpreter each: nothing of OpenGL or threads is inherited.
         spawn = multiprocessing.get_context("spawn")
-        stopped = spawn.Event()
+        with _signals_for_parent():
+            stopped = spawn.Event()
         with concurrent.futures.ProcessPoolExecutor(
             self.workers, mp_context=spawn, initializer=_begin_worker, initargs=(stopped,)
         ) as pool:
-            futures = {
-                pool.submit(_train_seed_in_worker, job): job.config.seed for job in self._jobs
-            }
+            with _signals_for_parent():
+                futures = {
+                    pool.submit(_train_seed_in_worker, job): job.config.seed for job in self._jobs
+                }
             try:
                 for found in _as_they_come(futures):
                     if stop():
@@ -210,6 +224,23 @@ def _result_of(future: "concurrent.futures.Future[SeedResult]", seed: int) -> Se
     except (concurrent.futures.BrokenExecutor, OSError) as error:
         # A worker process was killed from outside, or there is no memory for one.
         return SeedResult(seed, error=f"its process ended: {error}")
+
+
+@contextlib.contextmanager
+def _signals_for_parent() -> Iterator[None]:
+    """Have processes that are started inside never see signals that end a job.
+
+    A terminal, and `timeout`, send them to all processes of a job.
+    """
+    if sys.platform == "win32":
+        yield
+        return
+    ending = {signal.SIGINT, signal.SIGTERM, signal.SIGHUP}
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, ending)
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 _stopped: Event | None = None
@@ -263,8 +294,8 @@ def _train_in_memory(job: _Job, cartpole: CartPole, stop: Callable[[], bool]) ->
         if stop():
             return SeedResult(job.config.seed)
     result = training.result()
-    evaluation = evaluate_where_trained(result, cartpole, job.engine)
-    return SeedResult(job.config.seed, evaluation.summary(), result)
+    evaluation = evaluate_where_trained(result.policy, job.config, cartpole, job.engine)
+    return SeedResult(job.config.seed, evaluation, result)
 
 
 def _train_on_disk(
@@ -272,7 +303,8 @@ def _train_on_disk(
 ) -> SeedResult:
     seed = job.config.seed
     if runs.is_complete(folder):
-        return SeedResult(seed, runs.read_summary(folder).get("evaluation"))
+        policy = runs.load_run(folder).policy
+        return SeedResult(seed, evaluate_where_trained(policy, job.config, cartpole, job.engine))
     training = Training(job.config, engine=job.engine, cartpole=cartpole)
     session = Session(folder, training, cartpole, every=job.every)
     with _begun(job, folder, cartpole) as checkpoint:
@@ -285,7 +317,7 @@ def _train_on_disk(
         if evaluation is None:
             return SeedResult(seed)
         runs.finish_run(folder)
-    return SeedResult(seed, evaluation.summary(), result)
+    return SeedResult(seed, evaluation, result)
 
 
 @contextlib.contextmanager
@@ -318,10 +350,3 @@ def _check_workers(workers: int | None) -> int:
     if workers < 1:
         raise ConfigError(f"workers must be a number from 1 up, not {workers}")
     return workers
-
-
-def available_cores() -> int:
-    """Cores that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1

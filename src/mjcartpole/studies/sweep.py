@@ -43,7 +43,7 @@ class Stretch:
         return f"{low} to {high}"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class SweepResult:
     """Every policy at every value of one parameter.
 
@@ -60,6 +60,10 @@ class SweepResult:
     model: str
     played: TransferResult
     threshold: float = task.REWARD_THRESHOLD
+
+    def __repr__(self) -> str:
+        span = f"{self.key} from {self.values[0]:g} to {self.values[-1]:g} on {self.model}"
+        return f"SweepResult({span}, values: {len(self.values)}, {self.played!r})"
 
     @property
     def means(self) -> npt.NDArray[np.float64]:
@@ -139,7 +143,7 @@ def parse_sweep(text: str) -> tuple[str, tuple[float, ...]]:
 
 
 def sweep(
-    policies: Mapping[str, Policy],
+    policies: Mapping[str, Policy | Sequence[Policy]],
     model: ModelLike,
     key: str,
     values: Sequence[float],
@@ -154,7 +158,7 @@ def sweep(
     """Play every policy on a model at each value of one of its parameters.
 
     Args:
-        policies: By name.
+        policies: By name; see `transfer`.
         model: What is edited; see `load_model`.
         key: What is changed; see `edit_document`.
         values: Rising.

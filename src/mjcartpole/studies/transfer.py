@@ -48,13 +48,14 @@ class Place:
 
 @dataclass(frozen=True, eq=False)
 class Cell:
-    """One policy at one place.
+    """One policy at one place, or the policies of several seeds.
 
     Attributes:
         policy: The policy's name.
         place: The place's name.
-        evaluation: The episodes; None if they could not be played.
-        interval: 95 % bootstrap interval of the mean return over episodes.
+        evaluation: The episodes, seed by seed; None if they could not be played.
+        interval: 95 % bootstrap interval of the mean return: over episodes with one policy, else
+            over the seeds' means.
         error: Why they could not be played; empty if they could.
     """
 
@@ -67,7 +68,7 @@ class Cell:
     @property
     def mean(self) -> float:
         """Mean return; NaN if the episodes could not be played."""
-        return float("nan") if self.evaluation is None else float(self.evaluation.returns.mean())
+        return float("nan") if self.evaluation is None else self.evaluation.mean
 
     def summary(self) -> dict[str, Any]:
         """The figures as plain values, for JSON and CSV; None where there are none."""
@@ -79,14 +80,14 @@ class Cell:
             "mean": self.mean if known else None,
             "low": interval.low if interval else None,
             "high": interval.high if interval else None,
-            "minimum": float(evaluation.returns.min()) if evaluation else None,
+            "minimum": evaluation.minimum if evaluation else None,
             "episodes": len(evaluation.episodes) if evaluation else 0,
             **(evaluation.endings if evaluation else {}),
             "error": self.error,
         }
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class TransferResult:
     """Every policy on every model.
 
@@ -101,6 +102,10 @@ class TransferResult:
     places: tuple[str, ...]
     cells: tuple[Cell, ...]
     seed: int
+
+    def __repr__(self) -> str:
+        counts = f"policies: {len(self.policies)}, models: {len(self.places)}"
+        return f"TransferResult({counts}, seed {self.seed})"
 
     @property
     def rows(self) -> list[tuple[Cell, ...]]:
@@ -154,7 +159,7 @@ def find_place(
 
 
 def transfer(
-    policies: Mapping[str, Policy],
+    policies: Mapping[str, Policy | Sequence[Policy]],
     places: Sequence[Place | ModelLike],
     *,
     episodes: int = EPISODES,
@@ -167,7 +172,7 @@ def transfer(
     models. The same seed gives the same result, whatever the number of workers.
 
     Args:
-        policies: By name.
+        policies: By name; several under one name are one learner's, from several seeds.
         places: Places, or what `find_place` takes.
         episodes: Greedy episodes per cell.
         seed: Seeds the starting states and the bootstrap.
@@ -182,12 +187,17 @@ def transfer(
     if not policies or not places:
         raise ConfigError("a transfer needs one policy and one model at least")
     found = [place if isinstance(place, Place) else find_place(place) for place in places]
-    pairs = [(name, place) for name in policies for place in found]
+    groups = {
+        name: (group,) if isinstance(group, Policy) else tuple(group)
+        for name, group in policies.items()
+    }
+    pairs = [(name, place) for name in groups for place in found]
     for name, place in pairs:
-        policies[name].check_fits(place.poles, place.name)
+        for policy in groups[name]:
+            policy.check_fits(place.poles, place.name)
     with _pool(workers, len(pairs)) as pool:
         futures = [
-            pool.submit(_play, name, policies[name], place, episodes, seed) for name, place in pairs
+            pool.submit(_play, name, groups[name], place, episodes, seed) for name, place in pairs
         ]
         try:
             cells = tuple(future.result() for future in futures)
@@ -205,20 +215,31 @@ def _pool(workers: int | None, jobs: int) -> concurrent.futures.ThreadPoolExecut
     return concurrent.futures.ThreadPoolExecutor(min(workers or cores or 1, jobs))
 
 
-def _play(name: str, policy: Policy, place: Place, episodes: int, seed: int) -> Cell:
+def _play(name: str, policies: Sequence[Policy], place: Place, episodes: int, seed: int) -> Cell:
     try:
-        evaluation = evaluate(
-            policy,
-            backend=place.backend,
-            model=place.cartpole or "cartpole",
-            integrator=place.integrator,
-            episodes=episodes,
-            seed=seed,
-        )
+        played = [
+            evaluate(
+                policy,
+                backend=place.backend,
+                model=place.cartpole or "cartpole",
+                integrator=place.integrator,
+                episodes=episodes,
+                seed=seed,
+            )
+            for policy in policies
+        ]
     except MjCartPoleError as error:
         # One model that diverges is no reason to lose the others.
         return Cell(name, place.name, error=str(error))
-    return Cell(name, place.name, evaluation, _interval(evaluation.returns, seed))
+    episodes_of_all = tuple(episode for one in played for episode in one.episodes)
+    evaluation = Evaluation(place.backend, seed, episodes_of_all)
+    means = np.array([one.mean for one in played])
+    return Cell(
+        name,
+        place.name,
+        evaluation,
+        _interval(evaluation.returns if len(played) == 1 else means, seed),
+    )
 
 
 def _interval(returns: npt.NDArray[np.float64], seed: int) -> Interval:

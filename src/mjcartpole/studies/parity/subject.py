@@ -1,5 +1,6 @@
 """The model under examination, and what it is held against."""
 
+import dataclasses
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Literal, NamedTuple
@@ -14,10 +15,14 @@ from mjcartpole.integrator import Integrator
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.policy import Policy
 from mjcartpole.learning.training import Training
-from mjcartpole.physics.beyond import beyond_equations, beyond_step, overridden_masses
+from mjcartpole.physics.beyond import beyond_equations, beyond_step, idle_numbers
+from mjcartpole.physics.bodies import farthest_from_origin
+from mjcartpole.physics.deviations import Deviation, deviations
 from mjcartpole.physics.equations import CARTPOLE_V1, Parameters
+from mjcartpole.physics.file_steps import method_of
+from mjcartpole.physics.free_region import FreeRegion, free_region
 from mjcartpole.physics.model import CartPole, with_options
-from mjcartpole.physics.parameters import differences, read_parameters
+from mjcartpole.physics.parameters import read_parameters
 from mjcartpole.physics.simulation import Simulation
 
 Against = Literal["cartpole-v1", "itself"]
@@ -71,39 +76,76 @@ class Subject:
         return CARTPOLE_V1 if self.against == "cartpole-v1" else self.own
 
     @cached_property
+    def region(self) -> FreeRegion:
+        """Where states are drawn and compared.
+
+        A model that is asked about itself is tested where it moves freely. Of one that shall be
+        CartPole-v1, only that is left out which no episode meets.
+        """
+        region = free_region(self.cartpole)
+        return region if region.covers_task or self.against == "itself" else FreeRegion()
+
+    @cached_property
     def beyond(self) -> list[str]:
         """What the model has that the equations do not cover."""
-        return beyond_equations(self.cartpole)
+        met = [] if self.region.bounds else free_region(self.cartpole).bounds
+        return list(dict.fromkeys([*met, *beyond_equations(self.cartpole)]))
+
+    @property
+    def method(self) -> str:
+        """By which method of the equations the file's own integrator shall step."""
+        return "Euler" if self.against == "cartpole-v1" else method_of(self.cartpole)
 
     @cached_property
     def beyond_step(self) -> list[str]:
-        """Why one step of the file's own integrator is not semi-implicit Euler."""
-        return beyond_step(self.cartpole)
+        """Why one step of the file's own integrator is not what it is held against."""
+        return beyond_step(self.cartpole, self.method)
+
+    @cached_property
+    def deviations(self) -> list[Deviation]:
+        """By what the model's parameters differ from the reference's."""
+        return deviations(self.cartpole, self.reference)
 
     @cached_property
     def causes(self) -> list[str]:
-        """Everything by which the model's document differs from what it is held against."""
-        found = differences(self.own, self.reference) + self.beyond
-        if self.against == "cartpole-v1":
-            found += self.beyond_step + overridden_masses(self.cartpole)
-        return found
+        """Everything by which the model may move differently from what it is held against."""
+        found = [deviation.phrase for deviation in self.deviations] + self.beyond
+        return found + (self.beyond_step if self.against == "cartpole-v1" else [])
+
+    @property
+    def story(self) -> tuple[str, ...]:
+        """The causes as lines of a result."""
+        return tuple(f"differs: {cause}" for cause in self.causes)
 
     @cached_property
-    def causes_at_rest(self) -> list[str]:
-        """Those causes that accelerations can show: neither the timestep nor the integrator."""
-        return [
-            cause
-            for cause in self.causes
-            if cause not in self.beyond_step and not cause.startswith("timestep ")
-        ]
+    def numbers(self) -> list[str]:
+        """Everything by which the model's numbers differ from CartPole-v1's, felt or not."""
+        return self.causes + idle_numbers(self.cartpole) if self.against == "cartpole-v1" else []
+
+    @cached_property
+    def offset(self) -> float:
+        """How far from the world's origin the model stands at x = 0, m."""
+        return farthest_from_origin(self.cartpole)
 
     def rng(self, rung: int) -> np.random.Generator:
         """A rung's own generator, so that rungs can be run alone with the same result."""
         return np.random.default_rng([self.seed, rung])
 
     def simulation(self, integrator: Integrator) -> Simulation:
-        """The model in motion."""
-        return Simulation(self.cartpole, integrator)
+        """The model in motion; asked about itself, with dry friction solved to the end."""
+        simulation = Simulation(self.cartpole, integrator)
+        if self.solves_to_the_end:
+            simulation.model.opt.tolerance = 0.0
+        return simulation
+
+    @property
+    def solves_to_the_end(self) -> bool:
+        """Whether MuJoCo's solver is kept from stopping at its tolerance.
+
+        With friction that grips, that is now and then more than rounding.
+        """
+        rubs = self.own.slider_friction or self.own.hinge_friction
+        return self.against == "itself" and rubs is not None
 
     def ours(self, integrator: Integrator = "gym", **options: Any) -> gymnasium.Env[Any, Any]:  # noqa: ANN401
         """Our environment with this model."""
@@ -128,6 +170,8 @@ class Subject:
     @cached_property
     def gym_cannot(self) -> str:
         """Why gymnasium's formula cannot express the reference; empty if it can."""
+        if not (self.region.covers_task or self.against == "cartpole-v1"):
+            return f"it has no stops, and here an episode meets {'; '.join(self.region.bounds)}"
         return why_not_gymnasiums(self.reference)
 
     @cached_property
@@ -140,8 +184,12 @@ class Subject:
 
     def random_batch(self, rung: int, n: int, box: npt.ArrayLike) -> Batch:
         """N random states within ±box, and actions."""
-        rng, bound = self.rng(rung), np.asarray(box, dtype=np.float64)
-        return Batch(rng.uniform(-bound, bound, size=(n, 4)), rng.integers(2, size=n))
+        rng, (low, high) = self.rng(rung), self.region.box(box)
+        states, actions = rng.uniform(low, high, size=(n, 4)), rng.integers(2, size=n)
+        if not self.region.bounds:
+            return Batch(states, actions)
+        stays = self.region.holds_for_a_step(states, self.own)
+        return Batch(states[stays], actions[stays])
 
     def forces(self, batch: Batch) -> Vector:
         """The reference's push for each action of a batch, N."""
@@ -157,13 +205,22 @@ def why_not_gymnasiums(p: Parameters) -> str:
     uniform = p.pole_mass * p.com_distance**2 / 3
     if abs(p.inertia - uniform) > 1e-12 * uniform or p.com_distance <= 0:
         return "its pole is a uniform thin rod, and this one is not"
-    if p.slider_damping or p.hinge_damping or p.slider_armature or p.hinge_armature:
-        return "it knows neither damping nor armature"
+    if dataclasses.replace(p, **_WITHOUT) != p:
+        return "it knows neither damping, friction nor armature, and nothing that is tilted"
     if p.forces[0] != -p.forces[1] or p.hinge_sign != 1:
         return (
             "it pushes as hard to the left as to the right, and positive angles lean to the right"
         )
     return ""
+
+
+_WITHOUT: dict[str, Any] = {
+    field.name: field.default
+    for field in dataclasses.fields(Parameters)
+    if field.default is not dataclasses.MISSING
+    and field.name not in {"forces", "timestep", "hinge_sign"}
+}
+"""What a plain cart-pole does not have: none of it acts."""
 
 
 def set_parameters(env: gymnasium.Env[Any, Any], p: Parameters) -> None:

@@ -1,5 +1,6 @@
 """Rungs 6 and 7: how long two worlds stay together, open loop and closed loop."""
 
+import math
 from typing import Any, NamedTuple
 
 import gymnasium
@@ -8,7 +9,7 @@ import numpy.typing as npt
 from scipy import stats
 
 from mjcartpole.learning.episodes import ENDINGS, ending_index
-from mjcartpole.physics import equations
+from mjcartpole.physics import equations, linear
 from mjcartpole.studies.parity.dynamics import EPS, STEP_BOUNDS, beyond_result, step_unit
 from mjcartpole.studies.parity.result import Figure, Result
 from mjcartpole.studies.parity.subject import Batch, Subject, Vector
@@ -28,8 +29,8 @@ def horizon(subject: Subject) -> Result:
     """Rung 6: the same pushes in both worlds; the error against eps rho^t."""
     title = "horizon: open-loop error against its predicted growth"
     reason = (
-        f"each step may round by rung 3's {STEP_BOUNDS[subject.against]:.0f} ulp, and the "
-        "linearised step multiplies that by rho: eps rho^t times a constant that follows, "
+        f"each step may round by rung 3's {STEP_BOUNDS[subject.against]:.0f} ulp, and the steps "
+        "that follow, linearised where they are taken, multiply that: near rest by rho each, "
         f"up to {LARGEST_ERROR:g}"
     )
     if subject.against == "itself" and subject.beyond:
@@ -41,14 +42,14 @@ def horizon(subject: Subject) -> Result:
         ratios.append(float((run.error / run.predicted)[meant].max(initial=0.0)))
     figures = (
         Figure("largest error", max(ratios), 1.0, "of the predicted bound"),
-        Figure("rho, growth per step", equations.spectral_radius(subject.reference, "gym")),
+        Figure("rho, growth per step", linear.spectral_radius(subject.reference, "gym")),
         Figure(
             "float32 observations first differ at step, median",
             float(np.median([run.parted for run in runs])),
         ),
         Figure("episodes", float(len(runs))),
     )
-    story = () if figures[0].holds else tuple(subject.causes)
+    story = () if figures[0].holds else subject.story
     return Result(6, title, reason, figures, (), story)
 
 
@@ -68,35 +69,46 @@ class Growth(NamedTuple):
 
 def error_growth(subject: Subject, seed: int) -> Growth:
     """Play the same actions in both worlds until the pole leans far, and watch the difference."""
-    state = subject.rng(600 + seed).uniform(-0.05, 0.05, size=4)
-    simulation, other = subject.simulation("gym"), _Reference(subject, state)
-    simulation.state = state
-    gain = _stabilising_gain(subject)
+    p, gain = subject.reference, _stabilising_gain(subject)
+    start = subject.rng(600 + seed).uniform(-0.05, 0.05, size=4)
+    simulation, other = subject.simulation("gym"), _Reference(subject, start)
+    simulation.state = state = start
     errors: list[float] = []
-    unit, parted = EPS, HORIZON
-    while len(errors) < HORIZON and abs(state[2]) < 0.5 and not (errors and errors[-1] > 1):
+    bounds: list[float] = []
+    # What a step of the past has become by now: one matrix for each.
+    carried, unit, parted = np.empty((0, 4, 4)), EPS, HORIZON
+    while len(errors) < HORIZON and _goes_on(subject, state, errors):
         action = int(gain @ state > 0)
         batch = Batch(state[None, :], np.array([action]))
+        jacobian = linear.step_matrix(p, "gym", state=state, force=p.forces[action])
+        carried = np.concatenate([jacobian @ carried, np.eye(4)[None]])
         state = np.array(simulation.step(subject.cartpole.controls[action]))
         expected = other.step(action)
         unit = max(unit, float(step_unit(subject, batch, expected[None, :]).max()))
+        growth = float(np.abs(carried).sum(axis=2).max(axis=1).sum())
+        bounds.append(STEP_BOUNDS[subject.against] * unit * growth)
         errors.append(float(np.abs(state - expected).max()))
         if parted == HORIZON and np.any(state.astype(np.float32) != expected.astype(np.float32)):
             parted = len(errors)
-    return Growth(np.array(errors), predicted_growth(subject, len(errors), unit), parted)
+    return Growth(np.array(errors), np.array(bounds), parted)
 
 
-def predicted_growth(subject: Subject, steps: int, unit: float = EPS) -> Vector:
-    """Bound for the error after each step: what every step may round, carried on, shape (steps,).
+def _goes_on(subject: Subject, state: Vector, errors: list[float]) -> bool:
+    apart = errors and errors[-1] > 1
+    return bool(abs(state[2]) < 0.5 and subject.region.holds(state) and not apart)
+
+
+def predicted_growth(subject: Subject, steps: int) -> Vector:
+    """Bound near rest for the error after each step: what each may round, carried on, (steps,).
 
     sum over k < t of |J^k| u, with J the linearised step and u the bound of one step; it grows as
     rho^t, with rho the spectral radius of J.
     """
-    matrix = equations.step_matrix(subject.reference, "gym")
+    matrix = linear.step_matrix(subject.reference, "gym")
     power, total, bounds = np.eye(4), 0.0, np.empty(steps)
     for step in range(steps):
         total += float(np.linalg.norm(power, np.inf))
-        bounds[step] = STEP_BOUNDS[subject.against] * unit * total
+        bounds[step] = STEP_BOUNDS[subject.against] * EPS * total
         power = power @ matrix
     return bounds
 
@@ -129,7 +141,8 @@ def _stabilising_gain(subject: Subject) -> Vector:
     p = subject.reference
     arm = p.inertia / (p.pole_mass * abs(p.com_distance)) + abs(p.com_distance)
     time = float(np.sqrt(arm / max(abs(p.gravity), 1e-6)))
-    return p.hinge_sign * np.array([0.02, 0.05, 1.0, time])
+    sign = math.copysign(1.0, linear.linearisation(p)[1][3, 0])
+    return -sign * np.array([0.02, 0.05, 1.0, time])
 
 
 def closed_loop(subject: Subject) -> Result:
@@ -159,7 +172,7 @@ def closed_loop(subject: Subject) -> Result:
         Figure("mean length on MuJoCo", float(np.mean(lengths[0]))),
         Figure("mean length on gymnasium", float(np.mean(lengths[1]))),
     )
-    return Result(7, title, reason, figures, (), tuple(subject.causes) if too_early else ())
+    return Result(7, title, reason, figures, (), subject.story if too_early else ())
 
 
 Played = tuple[list[int], str]

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from mjcartpole.physics.simulation import Simulation
 from mjcartpole.studies.parity.result import Figure, Result
 from mjcartpole.studies.parity.subject import Subject
 from mjcartpole.versions import version_of
@@ -49,7 +50,7 @@ def dm_control(subject: Subject) -> Result:
 def _count_differences(subject: Subject, physics: Any) -> tuple[int, int]:  # noqa: ANN401
     """How many steps end at other bits, and of how many."""
     physics.legacy_step = False
-    simulation = subject.simulation("mujoco")
+    simulation = Simulation(subject.cartpole, "mujoco")
     order = list(subject.cartpole.joints)
     rng = subject.rng(10)
     compared = different = 0

@@ -1,0 +1,48 @@
+"""An environment's specification in plain values: JSON can hold it, and a copy makes it again."""
+
+import dataclasses
+import os
+from collections.abc import Mapping
+from typing import Any
+
+from gymnasium import logger
+from gymnasium.envs.registration import EnvSpec
+
+from mjcartpole.physics.model import CartPole, is_its_document
+
+
+def portable(spec: EnvSpec, cartpole: CartPole) -> EnvSpec:
+    """A specification whose arguments are numbers, texts, lists and dicts.
+
+    A model that is no name, path or text is there as its document, edits included.
+
+    Args:
+        spec: As gymnasium makes it.
+        cartpole: What the environment made of the arguments.
+    """
+    arguments = {name: _plain(value) for name, value in spec.kwargs.items()}
+    if not isinstance(arguments.get("model", ""), str):
+        arguments["model"] = cartpole.xml
+        arguments.pop("edits", None)
+        if cartpole.has_own_timestep:
+            arguments["own_timestep"] = True
+        if not is_its_document(cartpole):
+            logger.warn(
+                f"env.spec has the document of {cartpole.name}, which compiles to another model: "
+                "numbers of the model were changed after compiling, or written with fewer digits"
+            )
+    if all(arguments.get(name) is value for name, value in spec.kwargs.items()):
+        return spec
+    return dataclasses.replace(spec, kwargs=arguments)
+
+
+def _plain(value: Any) -> Any:  # noqa: ANN401 - whatever it is
+    if hasattr(value, "tolist"):
+        return value.tolist()
+    if isinstance(value, os.PathLike):
+        return os.fspath(value)
+    if isinstance(value, Mapping):
+        return {key: _plain(each) for key, each in value.items()}
+    if isinstance(value, list | tuple):
+        return type(value)(map(_plain, value))
+    return value

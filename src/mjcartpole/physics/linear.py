@@ -1,0 +1,68 @@
+"""The cart-pole's equations near one state: what a small error becomes.
+
+Derivatives are taken by a complex step, `Im f(s + i h) / h`, which has no rounding of its own:
+Squire and Trapp (1998), doi:10.1137/S003614459631241X.
+"""
+
+from collections.abc import Callable
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from mjcartpole.integrator import Integrator
+from mjcartpole.physics.equations import Array, Parameters, derivative, step
+
+_H: Final = 1e-30
+_REST: Final = np.zeros(4)
+
+
+def linearisation(p: Parameters) -> tuple[Array, Array]:
+    """A and B of `state_dot = A state + B force` near rest at angle 0.
+
+    Returns:
+        A, shape (4, 4), and B, shape (4, 1); SI units.
+    """
+    by_state = _jacobian(lambda states: derivative(p, states, 0.0), _REST)
+    by_force = derivative(p, _REST, np.asarray(1j * _H)).imag / _H
+    return by_state, by_force[:, None]
+
+
+def step_matrix(
+    p: Parameters,
+    integrator: Integrator = "gym",
+    h: float | None = None,
+    state: npt.ArrayLike = _REST,
+    force: float = 0.0,
+) -> Array:
+    """Jacobian of one `equations.step`, shape (4, 4): what it makes of a small error.
+
+    Args:
+        p: The cart-pole.
+        integrator: Whose step.
+        h: Seconds; the cart-pole's own timestep if None.
+        state: Where, shape (4,); at rest at angle 0 if not given.
+        force: N.
+
+    Raises:
+        ConfigError: The integrator is unknown.
+    """
+    return _jacobian(lambda states: step(p, states, force, integrator, h), np.asarray(state))
+
+
+def spectral_radius(p: Parameters, integrator: Integrator = "gym", h: float | None = None) -> float:
+    """How much one step multiplies a small error near rest at angle 0, in the long run.
+
+    The largest absolute eigenvalue of `step_matrix`; see there for the arguments. The cart's
+    position makes a double eigenvalue 1, so a pole that hangs, where nothing grows, gives 1 to
+    about eight digits.
+
+    Raises:
+        ConfigError: The integrator is unknown.
+    """
+    return float(np.abs(np.linalg.eigvals(step_matrix(p, integrator, h))).max())
+
+
+def _jacobian(function: Callable[[Array], Array], state: Array) -> Array:
+    """Column j is what coordinate j does, shape (4, 4)."""
+    return np.asarray(function(state + 1j * _H * np.eye(4)).imag.T / _H)

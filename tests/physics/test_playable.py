@@ -1,0 +1,128 @@
+"""No policy can balance some models: it is said of those, and of no other."""
+
+import re
+
+import numpy as np
+import pytest
+
+from mjcartpole import task
+from mjcartpole.physics import playable
+from mjcartpole.physics.model import load_model, model_names, models_folder
+from mjcartpole.physics.playable import why_unplayable
+from mjcartpole.physics.simulation import Simulation
+
+REFERENCE = (models_folder() / "cartpole.xml").read_text(encoding="utf-8")
+SERVO = re.sub(
+    "<motor .*/>", '<position joint="slider" kp="5000" ctrlrange="-1 1"/>', REFERENCE, count=1
+)
+THROWN = "use a smaller force, a shorter time step or a longer pole"
+FALLEN = "the pole falls to one side"
+CARRIED = "the cart leaves to one side"
+
+HOPELESS = {
+    "a huge force": ("cartpole", {"force": 1000}, THROWN),
+    "a force that is just too large": ("cartpole", {"force": 400}, THROWN),
+    "a huge force, many substeps": ("cartpole", {"force": 1000, "timestep": 2e-4}, THROWN),
+    "a stiff servo": (SERVO, {}, THROWN),
+    "a long step": ("cartpole", {"option.timestep": 0.15}, THROWN),
+    "a tiny pole": ("cartpole", {"pole.length": 0.02}, THROWN),
+    "two poles, a huge force": ("twopoles", {"force": 2000}, THROWN),
+    "a weak force": ("cartpole", {"force": 0.1}, FALLEN),
+    "a heavy cart": ("cartpole", {"cart.mass": 1000}, FALLEN),
+    "a rail that sticks": ("cartpole", {"rail.friction": 50}, FALLEN),
+    "a stronger wind": ("cartpole", {"option.gravity": "3 0 -9.8", "force": 1}, CARRIED),
+}
+COARSE = {
+    "a strong force": ("cartpole", {"force": 300}),
+    "steps of 0.1 s": ("cartpole", {"option.timestep": 0.1}),
+}
+PLAYABLE = {
+    "a strong force": ("cartpole", {"force": 60}),
+    "a small force": ("cartpole", {"force": 1}),
+    "100 substeps": ("cartpole", {"timestep": 2e-4}),
+    "a wind that the motor masters": ("cartpole", {"option.gravity": "2 0 -9.8", "force": 3}),
+    "damping": ("cartpole", {"hinge.damping": 0.5}),
+    "no gravity": ("cartpole", {"gravity": 0}),
+    "a pole held by a spring": ("cartpole", {"joint:hinge.stiffness": 5}),
+    "a weak motor helped by a spring": ("cartpole", {"joint:slider.stiffness": 50, "force": 0.1}),
+    "a long pole": ("cartpole", {"pole.length": 20}),
+    "a heavy pole": ("cartpole", {"pole.mass": 5}),
+}
+
+both = pytest.mark.parametrize("integrator", ["gym", "mujoco"])
+
+
+@both
+@pytest.mark.parametrize("case", HOPELESS)
+def test_what_cannot_be_balanced(case, integrator):
+    model, edits, advice = HOPELESS[case]
+    line = why_unplayable(load_model(model, edits, own_timestep="long" in case), integrator)
+    assert line is not None
+    assert line.startswith("no policy can balance this: from ")
+    assert advice in line
+    assert "\n" not in line
+
+
+@both
+@pytest.mark.parametrize("case", PLAYABLE)
+def test_what_a_policy_may_balance(case, integrator):
+    model, edits = PLAYABLE[case]
+    cartpole = load_model(model, edits, own_timestep="0.1 s" in case)
+    assert why_unplayable(cartpole, integrator) is None
+
+
+@both
+@pytest.mark.parametrize("case", COARSE)
+def test_what_hardly_any_policy_can_balance(case, integrator):
+    """Some sequence of actions lasts, but three of the same end an episode from upright."""
+    model, edits = COARSE[case]
+    cartpole = load_model(model, edits, own_timestep="0.1 s" in case)
+    line = why_unplayable(cartpole, integrator)
+    assert line.startswith("hardly any policy can balance this: from upright at rest either action")
+    lengths = [
+        lasted(Simulation(cartpole, integrator), np.zeros(4), [action] * 9) for action in (0, 1)
+    ]
+    assert f"within {max(lengths)} steps" in line
+
+
+@both
+@pytest.mark.parametrize("name", model_names())
+def test_the_gallery(name, integrator):
+    assert why_unplayable(load_model(name), integrator) is None
+
+
+@pytest.mark.parametrize("case", HOPELESS)
+def test_what_is_said_is_true_of_many_sequences(case):
+    model, edits, _ = HOPELESS[case]
+    cartpole = load_model(model, edits, own_timestep="long" in case)
+    line = why_unplayable(cartpole)
+    lost, starts = map(int, re.findall(r"from (\d+) of (\d+) starts", line)[0])
+    within = re.search(r"within (\d+) steps", line)
+    steps = int(within[1]) if within else 1
+    rng, simulation = np.random.default_rng(5), Simulation(cartpole)
+    longest = []
+    for start in np.random.default_rng(0).uniform(-0.05, 0.05, (starts, simulation.size)):
+        # Runs of one action, short ones and one that is never given up, and their opposites.
+        tried = [np.repeat(rng.integers(0, 2, steps), run)[:steps] for run in (1, 2, 5, 20, steps)]
+        tried += [1 - actions for actions in tried]
+        longest.append(max(lasted(simulation, start, actions) for actions in tried))
+    assert sum(each <= steps for each in longest) >= lost
+
+
+def lasted(simulation, start, actions) -> int:
+    """Control steps until an episode with these actions ends; one more if it does not."""
+    simulation.state = start[: simulation.size]
+    for done, action in enumerate(actions, start=1):
+        state = simulation.step(simulation.cartpole.controls[action])
+        if task.has_terminated(state[0], task.farthest(state[2::2])):
+            return done
+    return len(actions) + 1
+
+
+@pytest.mark.parametrize("edits", [{"timestep": 2e-5, "force": 0.1}, {"timestep": 2e-5}, {}])
+def test_the_work_is_bounded_however_many_substeps_a_model_asks_for(edits):
+    cartpole = load_model("cartpole", {**edits, "option.integrator": "RK4"})
+    search = playable._Search(Simulation(cartpole, "mujoco"))
+    search.lost(np.random.default_rng(0).uniform(-0.05, 0.05, (8, 4)).tolist())
+    # It looks at the sum between control steps, of one action or both.
+    assert 0 < search.steps <= playable.MOST_STEPS + 2 * 4 * cartpole.substeps
