@@ -171,6 +171,7 @@ def _transfer(command: Transfer) -> int:
         workers=command.workers,
         output=command.output,
         overwrite=command.overwrite,
+        allow_assets=command.allow_assets,
     )
 
 
@@ -198,7 +199,10 @@ def _train(command: Train) -> int:
         workers=command.workers,
         video=command.video,
         tensorboard=command.tensorboard,
+        allow_assets=command.allow_assets,
     )
+    if command.allow_assets and command.resume is None:
+        raise ConfigError("--allow-assets is for --resume; a new run's model may name any file")
     if command.resume is not None:
         _check_only_resumed(command)
         return train_command.run_resume(command.resume, how)
@@ -277,7 +281,7 @@ def _report_to_stderr() -> None:
 
 
 def _choice(command: Played) -> dict[str, Any]:
-    names = ("backend", "model", "integrator", "seed", "set", "own_timestep")
+    names = ("backend", "model", "integrator", "seed", "set", "own_timestep", "allow_assets")
     return {name: getattr(command, name) for name in names}
 
 

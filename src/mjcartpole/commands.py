@@ -32,6 +32,7 @@ class Choice:
     seed: int | None = None
     set: tuple[str, ...] = ()
     own_timestep: bool = False
+    allow_assets: tuple[Path, ...] = ()
 
 
 def run_evaluate(source: Path, choice: Choice, *, episodes: int, as_json: bool) -> int:
@@ -116,6 +117,7 @@ def set_stage(source: Path, choice: Choice) -> Stage:
     check_count(1, seed)
     backend: Backend
     integrator: Integrator
+    run: runs.Run | None = None
     if source.is_file():
         # Every run's own is called policy.json: its folder tells them apart.
         name = _run_name(source.parent) if source.name == runs.POLICY else source.stem
@@ -134,8 +136,10 @@ def set_stage(source: Path, choice: Choice) -> Stage:
     check_backend(backend, model, integrator, choice.set, own_timestep=choice.own_timestep)
     own_timestep = own_timestep or choice.own_timestep
     played_on: ModelLike = model
-    if choice.set or own_timestep:
-        played_on = load_model(model, choice.set, own_timestep=own_timestep)
+    if run is not None and model == str(run.model):
+        played_on = run.cartpole(choice.allow_assets, own_timestep=own_timestep)
+    if choice.set or (own_timestep and played_on == model):
+        played_on = load_model(played_on, choice.set, own_timestep=own_timestep)
     return Stage(name, policy, backend, played_on, integrator, seed)
 
 

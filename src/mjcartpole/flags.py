@@ -44,6 +44,8 @@ class Train:
     """Seconds between two checkpoints."""
     tensorboard: bool = False
     """Write the learning curve as TensorBoard events into the run folder."""
+    allow_assets: tuple[Path, ...] = ()
+    """With --resume: folders in which the meshes and textures of that run's model may lie."""
 
 
 @dataclass(frozen=True)
@@ -62,6 +64,8 @@ class Played:
     """The run's own if left out."""
     seed: int | None = None
     """Seeds the starting states; the same as after training if left out."""
+    allow_assets: tuple[Path, ...] = ()
+    """Folders in which the meshes and textures of a run's model may lie, besides the run's own."""
 
 
 @dataclass(frozen=True)
@@ -180,6 +184,8 @@ class Transfer:
     """Seeds the starting states."""
     workers: int | None = None
     """How many evaluations at once; as many as there are cores if left out."""
+    allow_assets: tuple[Path, ...] = ()
+    """Folders in which the meshes and textures of a run's model may lie, besides the run's own."""
     output: Annotated[Path | None, tyro.conf.arg(aliases=["-o"])] = None
     """Folder for the table, the JSON and the picture; in transfer/, they get a number where such
     are there already."""

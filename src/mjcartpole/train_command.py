@@ -54,6 +54,7 @@ class How:
         workers: How many seeds at once; None: as many as there are cores.
         video: Film the result.
         tensorboard: Write TensorBoard events.
+        allow_assets: Other folders in which the files of the model of a resumed run may lie.
     """
 
     engine: Engine = "compiled"
@@ -61,6 +62,7 @@ class How:
     workers: int | None = None
     video: bool = True
     tensorboard: bool = False
+    allow_assets: tuple[Path, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -135,7 +137,7 @@ def run_resume(path: Path, how: How) -> int:
         print(f"{folder} is complete: nothing is left to do{_unfinished(folder)}")
         return 0
     signals = StopSignals()
-    with signals.caught(), runs.resumed_folder(path) as begun:
+    with signals.caught(), runs.resumed_folder(path, how.allow_assets) as begun:
         config, how = begun.config, dataclasses.replace(how, video=how.video and begun.video)
         training = Training(config, engine=how.engine, cartpole=begun.cartpole)
         session = Session(folder, training, begun.cartpole, every=how.checkpoint_every)
@@ -169,7 +171,7 @@ def run_seeds(config: TrainConfig, how: How, where: Where, *, seeds: int) -> int
 
 def _resume_seeds(folder: Path, how: How) -> int:
     signals = StopSignals()
-    with signals.caught(), seed_runs.resumed_seeds(folder) as begun:
+    with signals.caught(), seed_runs.resumed_seeds(folder, how.allow_assets) as begun:
         crew = _crew(begun.config, begun.seeds, begun.cartpole, folder, begun.preset, how)
         about = _changes(begun.preset, begun.config)
         return _conduct_seeds(crew, begun.config, about, folder, begun.preset, signals)
@@ -293,6 +295,7 @@ def _crew(
         preset=preset,
         every=how.checkpoint_every,
         events=how.tensorboard,
+        allow_assets=how.allow_assets,
     )
 
 

@@ -54,6 +54,7 @@ def run_transfer(
     workers: int | None = None,
     output: Path | None = None,
     overwrite: bool = False,
+    allow_assets: tuple[Path, ...] = (),
 ) -> int:
     """Play policies on models they were not trained on, print and write. Returns the exit code.
 
@@ -72,12 +73,14 @@ def run_transfer(
         output: Folder for the CSV, JSON and PNG; None: transfer/, with a number in their names
             where such are there.
         overwrite: Replace what is there.
+        allow_assets: Other folders than a run's own in which the files of its model may lie.
 
     Raises:
         MjCartPoleError: Something cannot be used; nothing has been played then.
     """
     silence_mujoco()
-    policies = _find_policies(sources)
+    choice = Choice(allow_assets=allow_assets)
+    policies = _find_policies(sources, choice)
     physics: dict[str, Any] = {"integrator": integrator, "own_timestep": own_timestep}
     settings: dict[str, Any] = {"episodes": episodes, "seed": seed, "workers": workers}
     if swept is None:
@@ -93,8 +96,10 @@ def run_transfer(
     key, values = parse_sweep(swept)
     if len(models) > 1:
         raise ConfigError(f"a sweep edits one model, not {len(models)}; give one, or no --sweep")
-    own = sources[0] / runs.MODEL if seed_runs.is_seeds(sources[0]) else None
-    model = models[0] if models else own or set_stage(sources[0], Choice()).model
+    first = sources[0]
+    if seed_runs.is_seeds(first):
+        first = next(iter(learned_seeds(first).values()))
+    model = models[0] if models else set_stage(first, choice).model
     target = _target(output, "sweep-" + re.sub(r"[^\w.-]+", "-", key), overwrite)
     curve = sweep(policies, model, key, values, edits=edits, **physics, **settings)
     _print_sweep(curve)
@@ -121,11 +126,11 @@ def _target(output: Path | None, name: str, overwrite: bool) -> Path:
     return table
 
 
-def _find_policies(sources: Sequence[Path]) -> dict[str, tuple[Policy, ...]]:
+def _find_policies(sources: Sequence[Path], choice: Choice) -> dict[str, tuple[Policy, ...]]:
     """Policies by name, of many seeds all under one; those of one name are called by paths."""
     if not sources:
         raise ConfigError("transfer needs a RUN-OR-POLICY, or several")
-    found = {source: _members(source) for source in sources}
+    found = {source: _members(source, choice) for source in sources}
     count = Counter(name for name, _ in found.values())
     return {
         name if count[name] == 1 else str(source): policies
@@ -133,11 +138,11 @@ def _find_policies(sources: Sequence[Path]) -> dict[str, tuple[Policy, ...]]:
     }
 
 
-def _members(source: Path) -> tuple[str, tuple[Policy, ...]]:
+def _members(source: Path, choice: Choice) -> tuple[str, tuple[Policy, ...]]:
     if seed_runs.is_seeds(source):
         learned = learned_seeds(source).values()
         return source.resolve().name, tuple(runs.load_run(run).policy for run in learned)
-    stage = set_stage(source, Choice())
+    stage = set_stage(source, choice)
     return stage.name, (stage.policy,)
 
 

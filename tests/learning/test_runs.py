@@ -2,6 +2,7 @@
 
 import contextlib
 import csv
+import dataclasses
 import json
 
 import pytest
@@ -120,7 +121,7 @@ def test_a_damaged_policy_is_refused(run):
         runs.load_run(run)
 
 
-def test_a_model_leads_to_its_other_files_as_long_as_they_are_there(tmp_path):
+def test_a_model_is_stored_as_long_as_its_other_files_are_there(tmp_path):
     vertices = "0 0 0  1 0 0  0 1 0  0 0 1"
     obj = "".join(f"v {vertex}\n" for vertex in vertices.split("  "))
     (tmp_path / "m.obj").write_text(obj + "f 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n")
@@ -131,8 +132,53 @@ def test_a_model_leads_to_its_other_files_as_long_as_they_are_there(tmp_path):
     cartpole = load_model(tmp_path / "mesh.xml")
     runs.check_storable(cartpole)
     (tmp_path / "m.obj").unlink()
-    with pytest.raises(ModelError, match="needs other files beside it"):
-        runs.check_storable(cartpole)
+    with pytest.raises(ModelError, match=r"a file of the model cannot be read: .*m\.obj"):
+        runs.check_storable(dataclasses.replace(cartpole))
+
+
+def test_a_run_with_a_mesh_is_continued_elsewhere(tmp_path):
+    obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+    (tmp_path / "here").mkdir()
+    (tmp_path / "here" / "m.obj").write_text(obj)
+    mesh = '<asset><mesh name="m" file="m.obj"/></asset><worldbody>'
+    model = tmp_path / "here" / "mesh.xml"
+    model.write_text(load_model().xml.replace("<worldbody>", mesh, 1), encoding="utf-8")
+    config = TrainConfig(model=str(model), episodes=40)
+    runs.begin_run(tmp_path / "run", config, config.load_model(), preset="tuned")
+    checkpointed(tmp_path / "run", config, 10)
+    (tmp_path / "here").rename(tmp_path / "gone")
+    (tmp_path / "run").rename(tmp_path / "moved")
+    for _ in range(2):
+        with runs.resumed_folder(tmp_path / "moved") as begun:
+            assert begun.checkpoint is not None
+            assert begun.cartpole.model.nmesh == 1
+            training = Training(begun.config, cartpole=begun.cartpole)
+            session = Session(tmp_path / "moved", training, begun.cartpole, every=0)
+            session.resume(begun.checkpoint)
+            session.save()
+    (asset,) = (tmp_path / "moved").glob("asset-*")
+    asset.rename(tmp_path / "m.obj")
+    asset.symlink_to(tmp_path / "m.obj")
+    with pytest.raises(ModelError, match=r"lies outside the run's folder.*--allow-assets"):
+        runs.resumed_folder(tmp_path / "moved").__enter__()
+    with runs.resumed_folder(tmp_path / "moved", [tmp_path]) as begun:
+        assert begun.checkpoint is not None
+    runs.remove_run(tmp_path / "moved")
+    assert not (tmp_path / "moved").exists()
+    assert (tmp_path / "m.obj").read_text() == obj
+
+
+def test_a_run_may_be_replaced_by_one_with_its_own_model(tmp_path):
+    (tmp_path / "m.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\n")
+    mesh = '<asset><mesh name="m" file="m.obj"/></asset><worldbody>'
+    (tmp_path / "m.xml").write_text(load_model().xml.replace("<worldbody>", mesh, 1))
+    config = TrainConfig(model=str(tmp_path / "m.xml"))
+    runs.begin_run(tmp_path / "run", config, config.load_model(), preset="tuned")
+    config = TrainConfig(model=str(tmp_path / "run" / "model.xml"))
+    (tmp_path / "run" / f"asset-{'0' * 32}.obj").touch()
+    runs.begin_run(tmp_path / "run", config, config.load_model(), preset="tuned")
+    assert len(list((tmp_path / "run").glob("asset-*"))) == 1
+    assert load_model(tmp_path / "run" / "model.xml").model.nmesh == 1
 
 
 def checkpointed(folder, config, episodes):

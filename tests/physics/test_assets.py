@@ -10,8 +10,9 @@ import pytest
 from PIL import Image
 
 from mjcartpole.errors import ModelError, ModelNotFoundError
-from mjcartpole.learning.runs import check_storable
-from mjcartpole.physics.model import load_model, same_model, self_contained
+from mjcartpole.learning.runs import check_storable, write_model
+from mjcartpole.physics.assets import is_stored
+from mjcartpole.physics.model import load_model, load_stored, same_model, self_contained
 
 MESH = '<mesh name="m" file="{}"/>'
 TEXTURE = '<texture name="t" type="2d" file="{}"/>'
@@ -239,11 +240,62 @@ def test_the_stored_document_is_the_same_model_from_anywhere(case, tmp_path, mon
     check_storable(edited)
 
 
-def test_only_the_folders_are_written_anew(tmp_path):
+@pytest.mark.parametrize("case", LAYOUTS)
+def test_a_stored_model_needs_nothing_but_its_folder(case, tmp_path):
+    path = write(tmp_path / "here", LAYOUTS[case])
+    cartpole = load_model(path)
+    write_model(tmp_path / "run", cartpole)
+    (tmp_path / "here").rename(tmp_path / "gone")
+    (tmp_path / "run").rename(tmp_path / "moved")
+    document = (tmp_path / "moved" / "model.xml").read_text(encoding="utf-8")
+    stored = load_stored(document, "it", tmp_path / "moved")
+    assert same_model(stored.model, cartpole.model)
+    assert stored.stored[0] == document
+    assert str(tmp_path) not in document
+    assert all(is_stored(each.name) for each in (tmp_path / "moved").glob("[!m]*"))
+
+
+OUTSIDE = {
+    "above": (document("", MESH.format("../m.obj")), "m.obj"),
+    "absolute": (document("", MESH.format("{}/m.obj")), "m.obj"),
+    "a link": (document("", MESH.format("link.obj")), "link.obj"),
+    "by a folder": (document(compiler('meshdir="../run/.."'), MESH.format("m.obj")), "m.obj"),
+    "stripped": (
+        document(compiler('meshdir=".." strippath="true"'), MESH.format("m.obj")),
+        "m.obj",
+    ),
+    "a texture": (document("", TEXTURE.format("../t.png")), "t.png"),
+    "a side": (document("", CUBE.format("../t.png", "../t.png")), "t.png"),
+    "a height field": (document("", HFIELD.format("../t.png")), "t.png"),
+    "a skin": (document(more=SKIN.format("../s.skn")), "s.skn"),
+    "a cloth": (document(world=FLEX.format("../m.obj")), "m.obj"),
+    "a model": (document("", '<model file="../c.xml"/>'), "c.xml"),
+    "a model's mesh": (document("", '<model file="d.xml"/>'), "m.obj"),
+    "an include": (document('<include file="../i.xml"/>'), "i.xml"),
+}
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="links need rights")
+@pytest.mark.parametrize("case", OUTSIDE)
+def test_a_stored_model_reads_no_other_files_unless_allowed(case, tmp_path):
+    text, named = OUTSIDE[case]
+    text = text.replace("{}", str(tmp_path))
+    other = {"m.obj": "", "t.png": "", "s.skn": "", "c.xml": "<mujoco/>", "i.xml": included("")}
+    write(tmp_path, other)
+    write(tmp_path / "run", {"d.xml": CHILD.format("", "../m.obj"), "main.xml": text})
+    (tmp_path / "run" / "link.obj").symlink_to(tmp_path / "m.obj")
+    with pytest.raises(ModelNotFoundError, match="lies outside the run's folder") as caught:
+        load_stored(text, "it", tmp_path / "run")
+    assert named in str(caught.value)
+    assert f"--allow-assets {tmp_path.resolve()} " in str(caught.value)
+    load_stored(text, "it", tmp_path / "run", [tmp_path])
+
+
+def test_only_names_of_files_are_written_anew(tmp_path):
     text = document("<!-- a -- b --><compiler  meshdir = 'a'\n/>", MESH.format("m.obj"))
     path = write(tmp_path, {"main.xml": text, "a/m.obj": ""})
-    folder = tmp_path.resolve() / "a"
-    assert load_model(path).xml == text.replace("'a'", f"'{folder}'")
+    file = tmp_path.resolve() / "a" / "m.obj"
+    assert load_model(path).xml == text.replace("'a'", "''").replace("m.obj", str(file))
     plain = document("<!-- a -- b --><compiler meshdir='a' assetdir='b'/>", "<!-- mesh -->")
     assert self_contained(plain, tmp_path) == plain
 

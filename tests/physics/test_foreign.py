@@ -213,10 +213,10 @@ NO_CART_POLES = {
         document(motor='<general joint="s" dyntype="filter" dynprm="0.1"/>'),
         r"activation states \(filter\)",
     ),
-    "muscle": (document(motor='<muscle joint="s"/>'), "a muscle, with activation states"),
+    "muscle": (document(motor='<muscle joint="s"/>'), "muscle"),
     "general muscle": (
         document(motor='<general joint="s" dyntype="muscle"/>'),
-        "a muscle, with activation states",
+        "muscle",
     ),
     "cylinder": (document(motor='<cylinder joint="s"/>'), "activation states"),
     "no gear": (document(motor='<motor joint="s" gear="0"/>'), "pushes with 0 N whatever"),
@@ -287,14 +287,14 @@ def test_what_is_no_mjcf(case):
 TOO_MUCH = {
     "copies": (
         document(with_pole(POLE.format("")) + '<replicate count="1000000"><site/></replicate>'),
-        "more than 5000 elements",
+        "asks for too much: .*(not done within|ended)",
     ),
     "copies of copies": (
         document(
             with_pole(POLE.format(""))
             + '<replicate count="900"><replicate count="900"><site/></replicate></replicate>'
         ),
-        "more than 5000 elements",
+        "asks for too much: .*(not done within|ended)",
     ),
     "depth": (document(with_pole(POLE.format("<body>" * 300 + "</body>" * 300))), "200 levels"),
     "pixels": (
@@ -302,17 +302,17 @@ TOO_MUCH = {
             more='<asset><texture builtin="flat" type="2d" name="t" '
             'width="100000" height="100000"/></asset>'
         ),
-        "width x height of <texture> is 100000 x 100000",
+        "asks for too much: .*no memory left",
     ),
     "memory": (
         document(more='<size memory="2G"/>'),
-        "memory of <size> is 2G; no more than 1073741824",
+        "asks for too much: .*no memory left",
     ),
-    "contacts": (document(more='<size nconmax="2000000000"/>'), "nconmax of <size> is 2000000000"),
+    "contacts": (document(more='<size nconmax="2000000000"/>'), "asks for too much: .*memory left"),
     "iterations": (document(more='<option iterations="1000000"/>'), "1000000 iterations in each"),
     "simulated lengths": (
         document(more='<compiler><lengthrange mode="all" inttotal="1e9"/></compiler>'),
-        "simulate the length ranges",
+        "asks for too much",
     ),
     "gravity": (document(more='<option gravity="0 0 nan"/>'), "NaN or infinite .gravity of"),
     "range": (document(motor='<motor joint="s" ctrlrange="-inf inf"/>'), "NaN or infinite"),
@@ -331,7 +331,7 @@ def test_what_asks_for_too_much(case):
     text, reason = TOO_MUCH[case]
     with pytest.raises(ModelError, match=reason) as caught:
         load_model(text)
-    assert type(caught.value) is ModelError
+    assert not isinstance(caught.value, NotACartPoleError)
     assert_clear(caught.value)
 
 
@@ -365,7 +365,7 @@ INCLUDES = {
     "a folder": (".", ModelNotFoundError, "cannot be read"),
     "nothing": ("", ModelNotFoundError, "cannot be read"),
     "in a circle": ("a.xml", ModelSyntaxError, "includes 'a.xml' more than once, or in a circle"),
-    "broken": ("broken.xml", ModelSyntaxError, r"'broken\.xml', which .* includes, is not a valid"),
+    "broken": ("broken.xml", ModelSyntaxError, r"'broken\.xml' is not a valid MJCF"),
 }
 
 

@@ -142,7 +142,7 @@ def test_documents_that_are_no_mjcf(text):
         (
             "<motor (.*?) gear=.10.",
             r"<muscle \1 ",
-            "a muscle, with activation states",
+            "it has a muscle",
         ),
         ('gear="10"', 'gear="0"', "a motor that pushes with 0 N whatever the control"),
         ('ctrlrange="-1 1"', 'ctrlrange="-1 1" forcerange="2 3" ', "pushes with 20 N whatever"),

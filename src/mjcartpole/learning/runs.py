@@ -2,6 +2,7 @@
 
 runs/<name>/
 model.xml       the model as it was, whole: it compiles to the same model anywhere
+asset-*         the meshes, textures and other files that it names, called by their content
 versions.json   Python, the platform and the packages
 config.json     the preset's name and the full config; with it a training can be continued
 checkpoint.bin  while it lasts: its state (see checkpoints.py), and checkpoint-previous.bin
@@ -17,7 +18,9 @@ import functools
 import json
 import os
 import platform
-from collections.abc import Iterable, Iterator
+import shutil
+import tempfile
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -26,6 +29,7 @@ from mjcartpole.errors import CheckpointError, ConfigError, ModelError, RunError
 from mjcartpole.files import (
     is_temporary,
     remove_leftovers,
+    replacing,
     write_whole,
 )
 from mjcartpole.learning.checkpoints import (
@@ -39,7 +43,9 @@ from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.folders import LOCK, held_folder, locked_folder
 from mjcartpole.learning.policy import Policy
 from mjcartpole.learning.training import TrainResult
-from mjcartpole.physics.model import CartPole, load_model, same_model
+from mjcartpole.physics.assets import is_stored, name_by_content
+from mjcartpole.physics.model import CartPole, load_stored, same_model
+from mjcartpole.physics.reading import read_text
 from mjcartpole.versions import version_of
 
 CONFIG, VERSIONS, MODEL = "config.json", "versions.json", "model.xml"
@@ -74,6 +80,26 @@ class Run:
     def model(self) -> Path:
         """The model as it was in training."""
         return self.folder / MODEL
+
+    def cartpole(
+        self, allow_assets: Sequence[Path] = (), *, own_timestep: bool = False
+    ) -> CartPole:
+        """Load the model as it was in training.
+
+        Args:
+            allow_assets: Other folders than the run's in which the files that it names may lie.
+            own_timestep: See `load_model`; as a run that was trained so.
+
+        Raises:
+            ModelError: It cannot be used, or names a file elsewhere.
+        """
+        return load_stored(
+            read_text(self.model),
+            str(self.model),
+            self.folder,
+            allow_assets,
+            own_timestep=own_timestep or self.config.own_timestep,
+        )
 
 
 @dataclass(frozen=True)
@@ -120,20 +146,18 @@ def claimed_folder(folder: Path, *, overwrite: bool = False) -> Iterator[None]:
         finally:
             if not before and not {LATEST, PREVIOUS, *RESULTS} & content_of(folder):
                 _remove(folder, reversed(BEGINNING))
+                remove_assets(folder)
 
 
 def check_storable(cartpole: CartPole) -> None:
-    """Refuse a model whose document alone does not give the same model again.
+    """Refuse a model that is another one when it is read back from what a run stores.
 
     Raises:
-        ModelError: It refers to other files, such as meshes.
+        ModelError: It is, or a file that it needs cannot be read.
     """
-    try:
-        again = load_model(cartpole.xml, own_timestep=True)
-    except ModelError as error:
-        raise ModelError(
-            f"{cartpole.name} needs other files beside it, and a run stores one document: {error}"
-        ) from error
+    with tempfile.TemporaryDirectory() as temporary:
+        write_model(Path(temporary), cartpole)
+        again = load_stored(cartpole.stored[0], cartpole.name, Path(temporary), own_timestep=True)
     if not same_model(again.model, cartpole.model):
         raise ModelError(
             f"{cartpole.name} compiles to another model when its document stands alone; "
@@ -150,11 +174,39 @@ def begin_run(
         FileError: The folder cannot be written.
     """
     # The config first: without it a folder holds no run, so that two are never mixed.
-    _remove_files(folder)
+    _remove_files(folder, keep=cartpole.stored[1])
     write_versions(folder)
-    write_whole(folder / MODEL, cartpole.xml)
+    write_model(folder, cartpole)
     about = {"preset": preset, "video": video, **dataclasses.asdict(config)}
     write_whole(folder / CONFIG, _json(about))
+
+
+def write_model(folder: Path, cartpole: CartPole) -> None:
+    """Write a model's document, and beside it the files that it names.
+
+    Raises:
+        FileError: The folder cannot be written, or a file cannot be read.
+        ModelError: A file cannot be read.
+    """
+    document, files = cartpole.stored
+    for name, source in files.items():
+        if isinstance(source, str):
+            write_whole(folder / name, source)
+        elif not _has(folder / name):
+            with replacing(folder / name) as temporary:
+                shutil.copyfile(source, temporary)
+    write_whole(folder / MODEL, document)
+
+
+def _has(asset: Path) -> bool:
+    """Whether a file is there whole; a model may have been loaded from this very folder."""
+    return asset.is_file() and not asset.is_symlink() and name_by_content(asset) == asset.name
+
+
+def remove_assets(folder: Path, keep: Iterable[str] = ()) -> None:
+    """Remove the files that a model named, but for some."""
+    names = {path.name for path in folder.glob("asset-*") if is_stored(path.name)}
+    _remove(folder, names - set(keep))
 
 
 def write_results(folder: Path, result: TrainResult, summary: dict[str, Any]) -> None:
@@ -252,11 +304,12 @@ def load_run(folder: str | os.PathLike[str]) -> Run:
 
 
 @contextlib.contextmanager
-def resumed_folder(path: Path) -> Iterator[Begun]:
+def resumed_folder(path: Path, allow_assets: Sequence[Path] = ()) -> Iterator[Begun]:
     """Hold the folder of a run that is to be continued.
 
     Args:
         path: A run folder, for its latest checkpoint, or one checkpoint in it.
+        allow_assets: Other folders in which the files of its model may lie.
 
     Raises:
         RunError: There is no training to be continued, or another one is at work.
@@ -267,24 +320,38 @@ def resumed_folder(path: Path) -> Iterator[Begun]:
     folder = run_folder(path)
     with locked_folder(folder):
         remove_leftovers(folder)
-        begun = _load_begun(folder, path)
+        begun = _load_begun(folder, path, allow_assets)
         if begun.checkpoint is not None:
             # The one that was chosen is now the latest, and a damaged one takes no place again.
             keep_only(folder, path if path.is_file() else folder / LATEST)
         yield begun
 
 
-def stored_model(document: str, config: TrainConfig) -> CartPole:
+def stored_model(
+    document: str, config: TrainConfig, folder: Path, allow_assets: Sequence[Path] = ()
+) -> CartPole:
     """The model of a run from the document that it stores, under the name that was trained on.
 
+    Args:
+        document: The document.
+        config: The run's.
+        folder: The run's.
+        allow_assets: Other folders in which the files that it names may lie.
+
     Raises:
-        ModelError: The document was damaged.
+        ModelError: The document was damaged, or names a file elsewhere.
     """
-    cartpole = load_model(document, own_timestep=config.own_timestep)
+    cartpole = load_stored(
+        document,
+        f"'{folder / MODEL}'",
+        folder,
+        allow_assets,
+        own_timestep=config.own_timestep,
+    )
     return dataclasses.replace(cartpole, name=config.model)
 
 
-def _load_begun(folder: Path, path: Path) -> Begun:
+def _load_begun(folder: Path, path: Path, allow_assets: Sequence[Path]) -> Begun:
     if not (folder / CONFIG).is_file():
         raise RunError(
             f"'{folder}' holds no training that could be continued; start one with "
@@ -295,8 +362,8 @@ def _load_begun(folder: Path, path: Path) -> Begun:
         document = (folder / MODEL).read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise RunError(f"'{folder / MODEL}' cannot be read: {error}") from error
-    cartpole = stored_model(document, config)
-    checkpoint = _checkpoint(folder, path, config, cartpole)
+    cartpole = stored_model(document, config, folder, allow_assets)
+    checkpoint = _checkpoint(folder, path, config, document, cartpole.poles)
     return Begun(folder, preset, video, config, cartpole, checkpoint)
 
 
@@ -320,12 +387,10 @@ def versions() -> dict[str, str]:
 
 
 def _checkpoint(
-    folder: Path, path: Path, config: TrainConfig, cartpole: CartPole
+    folder: Path, path: Path, config: TrainConfig, document: str, poles: int
 ) -> Checkpoint | None:
     latest, previous = folder / LATEST, folder / PREVIOUS
-    load = functools.partial(
-        load_checkpoint, config=config, document=cartpole.xml, poles=cartpole.poles
-    )
+    load = functools.partial(load_checkpoint, config=config, document=document, poles=poles)
     if path.is_file():
         return load(path)
     if not latest.exists():
@@ -367,7 +432,8 @@ def content_of(folder: Path) -> set[str]:
     """Names of what lies in a folder, without what a killed training may have left behind."""
     if not folder.is_dir():
         return set()
-    return {path.name for path in folder.iterdir() if not is_temporary(path.name)} - {LOCK}
+    names = {path.name for path in folder.iterdir()} - {LOCK}
+    return {name for name in names if not is_temporary(name) and not is_stored(name)}
 
 
 def _remove(folder: Path, names: Iterable[str]) -> None:
@@ -375,10 +441,11 @@ def _remove(folder: Path, names: Iterable[str]) -> None:
         (folder / name).unlink(missing_ok=True)
 
 
-def _remove_files(folder: Path) -> None:
-    """Remove all files of a run, the config first."""
+def _remove_files(folder: Path, keep: Iterable[str] = ()) -> None:
+    """Remove all files of a run but for some of its model's, the config first."""
     events = (path.name for path in folder.glob(EVENTS))
     _remove(folder, (CONFIG, MODEL, *events, *RESULTS, LATEST, PREVIOUS, VERSIONS))
+    remove_assets(folder, keep)
 
 
 def _read_config(path: Path) -> tuple[str, bool, TrainConfig]:

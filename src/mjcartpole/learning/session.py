@@ -49,7 +49,7 @@ class Session:
         self.training = training
         self._folder = folder
         self._every = every
-        self._model = checksum(cartpole.xml)
+        self._model = checksum(cartpole.stored[0])
 
     def run(self, stop: Callable[[], bool]) -> Iterator[int]:
         """Train until the end, or until `stop()` is true.
@@ -74,6 +74,7 @@ class Session:
     def resume(self, checkpoint: Checkpoint | None) -> None:
         """Go on from a checkpoint of this very training; from the beginning if there is none."""
         if checkpoint is not None:
+            self._model = checkpoint.model
             self.training.restore(checkpoint.snapshot)
 
     def save(self) -> None:

@@ -1,35 +1,30 @@
-"""The files that a document needs beside it: meshes, height fields, skins, textures, other models.
+"""The files that a document names: meshes, height fields, skins, textures, other models.
 
 MuJoCo joins a file's name to `meshdir` or `texturedir` of <compiler>, and that to the folder of the
 main file. In an included file a name that leads nowhere from there is sought beside that file; an
-attached model is sought beside the file that names it. Here these folders are written into the
-document as absolute paths, so that it compiles to the same model wherever the program runs.
+attached model is sought beside the file that names it. `strippath` of the main file counts for all.
 """
 
+import hashlib
 import os
+import re
 import stat
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
-from xml.etree import ElementTree
 
 from mjcartpole.errors import ModelError, ModelNotFoundError
-from mjcartpole.physics.document import Document
+from mjcartpole.physics.document import Document, Element
 
 MODEL: Final = "model"
 
-_SIDES: Final = ("right", "left", "up", "down", "front", "back")
+_FOLDERS: Final = {"assetdir", "meshdir", "texturedir"}
 
-_FILES: Final = {
-    "mesh": ("file",),
-    "hfield": ("file",),
-    "skin": ("file",),
-    "flexcomp": ("file",),
-    "texture": ("file", *(f"file{side}" for side in _SIDES)),
-    MODEL: ("file",),
-}
-"""Elements that name files, and the attributes that do."""
+_NAMED_BY_FILE: Final = ("mesh", "hfield", "skin", "texture")
+"""Elements that are called by their file where they have no name."""
+
+_STORED: Final = re.compile(r"asset-[0-9a-f]{32}(\.\w{1,10})?")
 
 
 @dataclass(frozen=True)
@@ -37,29 +32,21 @@ class Asset:
     """A file that an element names.
 
     Attributes:
-        tag: The element's tag.
-        place: Which element of the document it is, counted from the root.
+        element: The element.
         attribute: The attribute that names the file.
-        name: The file's name as it is written there.
         path: Where MuJoCo finds it, absolute.
         tried: All paths that MuJoCo may open for it.
-        folder: The attribute of <compiler> that gives its folder; "" if none does.
-        moved: Whether the folder that <compiler> gives does not lead to it.
     """
 
-    tag: str
-    place: int
+    element: Element
     attribute: str
-    name: str
     path: Path
     tried: tuple[Path, ...]
-    folder: str
-    moved: bool
 
     @property
-    def absolute(self) -> bool:
-        """Whether its name is a whole path as it is written."""
-        return _plain(self.name).is_absolute()
+    def name(self) -> str:
+        """The file's name as it is written."""
+        return self.element.attributes[self.attribute]
 
 
 @dataclass(frozen=True)
@@ -68,84 +55,133 @@ class Folders:
 
     Attributes:
         main: The main file's folder, absolute.
-        given: The folders of meshes and of textures, absolute, by their attribute of <compiler>.
-        sought: By tag, where a name of an included file is tried first, absolute.
+        inside: Folders in which all files must lie; None: anywhere.
         strip: Whether only the last part of a name counts.
     """
 
     main: Path
-    given: Mapping[str, Path]
-    sought: Mapping[str, Path]
-    strip: bool
+    inside: tuple[Path, ...] | None
+    strip: bool = False
 
+    def check(self, path: Path, called: str) -> None:
+        """Refuse what lies outside, and what is no regular file: MuJoCo might read it for ever.
 
-def folders_of(root: ElementTree.Element, main: Path) -> Folders:
-    """Where MuJoCo looks for the files of a document.
+        A file that is missing is MuJoCo's to refuse.
 
-    Args:
-        root: Its outermost element, includes put in their place.
-        main: The main file's folder, absolute.
-    """
-    compilers = [compiler.attrib for compiler in root.iter("compiler")]
-    last = {name: value for attributes in compilers for name, value in attributes.items()}
-    both = last.get("assetdir", "")
-    sought = {
-        "mesh": last.get("meshdir") or both,
-        "texture": last.get("texturedir") or both,
-        "hfield": both,
-        "skin": both,
-        "flexcomp": "",
-    }
-    return Folders(
-        main,
-        {each: _join(main, _given(compilers, each)) for each in ("meshdir", "texturedir")},
-        {MODEL: Path.cwd()} | {tag: _join(main, folder) for tag, folder in sought.items()},
-        any(attributes.get("strippath") == "true" for attributes in compilers),
-    )
+        Args:
+            path: Where it is.
+            called: What names it, in words.
 
-
-def _given(compilers: list[dict[str, str]], name: str) -> str:
-    """The folder that several <compiler> give together: a later one has the last word."""
-    folder = ""
-    for attributes in compilers:
-        folder = attributes.get(name, attributes.get("assetdir", folder))
-    return folder
+        Raises:
+            ModelNotFoundError: It is a folder, a pipe or a device, or may not be read.
+        """
+        if self.inside is not None:
+            real = Path(os.path.realpath(path))
+            if not any(real.is_relative_to(os.path.realpath(root)) for root in self.inside):
+                raise ModelNotFoundError(
+                    f"{called} is not read: '{path}' lies outside the run's folder; if you trust "
+                    f"this run, allow it with --allow-assets {real.parent} (allow_assets=…)"
+                )
+        if kind := what_else(path):
+            raise ModelNotFoundError(f"{called} cannot be read: '{path}' is {kind}")
 
 
 def find_assets(
-    root: ElementTree.Element, folders: Folders, origins: Mapping[ElementTree.Element, Path]
+    document: Document, folders: Folders, origins: Sequence[Path | None]
 ) -> list[Asset]:
     """All files that a document names, but for its includes.
 
     Args:
-        root: Its outermost element, includes put in their place.
+        document: The document, includes put in their place.
         folders: Where MuJoCo looks for them.
-        origins: The absolute folder of the file that an element was included from.
+        origins: For each element the absolute folder of the file that it was included from, None
+            where it is the main file's own.
     """
-    elements = [element for element in root.iter() if isinstance(element.tag, str)]
+    compilers = [each.attributes for each in _compilers(document)]
     return [
-        _asset(element, place, attribute, folders, origins.get(element))
-        for place, element in enumerate(elements)
-        for attribute in _FILES.get(element.tag, ())
-        if element.get(attribute)
+        _asset(element, attribute, folders, compilers, origin)
+        for element, origin in zip(document.root.walk(), origins, strict=True)
+        for attribute, name in element.attributes.items()
+        if attribute.startswith("file") and name and element.tag != "include"
     ]
 
 
-def check_files(assets: list[Asset], name: str) -> None:
-    """Refuse what is there but is no plain file: MuJoCo would read it for ever, or wait for ever.
+def strips(document: Document) -> bool:
+    """Whether only the last part of a file's name counts in a document and all it attaches."""
+    return any(each.attributes.get("strippath") == "true" for each in _compilers(document))
 
-    A file that is missing is MuJoCo's to refuse.
+
+def write_paths(document: Document, assets: list[Asset], folders: Folders) -> None:
+    """Have a document lead to its files from anywhere; without such files it stays as it was.
 
     Raises:
-        ModelNotFoundError: It is a folder, a pipe or a device.
+        ModelError: A folder's name cannot be written as text.
     """
-    for asset in assets:
-        for path in asset.tried:
-            if kind := what_else(path):
-                raise ModelNotFoundError(
-                    f"'{asset.name}', which {name} names as the file of a <{asset.tag}>, cannot be "
-                    f"read: '{path}' is {kind}"
-                )
+    try:
+        # Where names are stripped, of attached models' files too, folders lead to them.
+        for asset in reversed(assets):
+            if asset.element.tag == MODEL or not folders.strip:
+                document.set(asset.element, asset.attribute, str(asset.path))
+        if assets:
+            _set_folders(document, folders)
+    except UnicodeEncodeError as error:
+        raise ModelError(
+            f"the files of a model in the folder {str(folders.main)!r} cannot be named in its "
+            "document, since that name is not UTF-8; rename the folder"
+        ) from error
+
+
+def store_names(document: Document, assets: list[Asset], names: Mapping[Path, str]) -> None:
+    """Name files otherwise; elements that were called by their file keep that name."""
+    for asset in reversed(assets):
+        element = asset.element
+        if asset.attribute == "file" and element.tag in _NAMED_BY_FILE and not element.name:
+            document.set(element, "name", asset.path.stem)
+        document.set(element, asset.attribute, names[asset.path])
+    if assets:
+        _set_folders(document, None)
+
+
+def _set_folders(document: Document, folders: Folders | None) -> None:
+    compilers = _compilers(document)
+    given = [each.attributes.copy() for each in compilers]
+    for compiler in compilers:
+        for name in compiler.attributes.keys() & _FOLDERS:
+            document.set(compiler, name, "")
+    if folders is not None and folders.strip:
+        for name in ("meshdir", "texturedir"):
+            document.set(compilers[-1], name, str(_join(folders.main, _given(given, name))))
+
+
+def _compilers(document: Document) -> list[Element]:
+    return [each for each in document.root.walk() if each.tag == "compiler"]
+
+
+def name_by_content(path: Path, content: str | None = None) -> str:
+    """What a file is called in a run.
+
+    Args:
+        path: Where it is.
+        content: What is stored in its place; the file as it is if left out.
+
+    Raises:
+        ModelNotFoundError: It cannot be read.
+    """
+    if content is not None:
+        digest = hashlib.sha256(content.encode())
+    else:
+        try:
+            with path.open("rb") as file:
+                digest = hashlib.file_digest(file, "sha256")
+        except OSError as error:
+            raise ModelNotFoundError(f"a file of the model cannot be read: {error}") from error
+    name = f"asset-{digest.hexdigest()[:32]}"
+    return name + path.suffix if is_stored(name + path.suffix) else name
+
+
+def is_stored(name: str) -> bool:
+    """Whether a file's name is one that `name_by_content` gives."""
+    return _STORED.fullmatch(name) is not None
 
 
 def what_else(path: Path) -> str:
@@ -159,79 +195,49 @@ def what_else(path: Path) -> str:
     return "a folder" if stat.S_ISDIR(mode) else "no regular file"
 
 
-def with_absolute_paths(text: str, assets: list[Asset], folders: Folders) -> str:
-    """A document that leads to its files from anywhere; without such files, as it was.
-
-    Args:
-        text: A document without includes.
-        assets: The files that it names.
-        folders: Where MuJoCo looks for them.
-
-    Raises:
-        ModelSyntaxError: The text cannot be edited.
-        ModelError: A folder's name cannot be written as text.
-    """
-    if not assets:
-        return text
-    document = Document(text)
-    try:
-        _write_paths(document, assets, folders)
-    except UnicodeEncodeError as error:
-        raise ModelError(
-            f"the files of a model in the folder {str(folders.main)!r} cannot be named in its "
-            "document, since that name is not UTF-8; rename the folder"
-        ) from error
-    return document.text
-
-
-def _write_paths(document: Document, assets: list[Asset], folders: Folders) -> None:
-    elements = list(document.root.walk())
-    for asset in assets:
-        if asset.moved:
-            document.set(elements[asset.place], asset.attribute, str(asset.path))
-    needed = {
-        asset.folder
-        for asset in assets
-        if asset.folder and (folders.strip or not (asset.moved or asset.absolute))
-    }
-    if needed:
-        # The last <compiler> has the last word, and its meshdir the word over its assetdir.
-        found = [child for child in document.root.children if child.tag == "compiler"]
-        compiler = found[-1] if found else document.insert(document.root, "compiler")
-        for each in sorted(needed):
-            document.set(compiler, each, str(folders.given[each]))
-
-
 def _asset(
-    element: ElementTree.Element,
-    place: int,
+    element: Element,
     attribute: str,
     folders: Folders,
+    compilers: list[dict[str, str]],
     origin: Path | None,
 ) -> Asset:
-    name = element.get(attribute, "")
-    model = element.tag == MODEL
-    attribute_of_folder = "texturedir" if element.tag == "texture" else "meshdir"
-    folder = folders.main if model else folders.given[attribute_of_folder]
-    path = usual = _join(folder, name)
-    tried = [usual, folder / usual.name]
+    model, name = element.tag == MODEL, element.attributes[attribute]
+    if folders.strip and not model:
+        name = re.split(r"[/\\]", name)[-1]
+    kind = "texturedir" if element.tag == "texture" else "meshdir"
+    given = "" if model else _given(compilers, kind)
+    path = usual = _join(folders.main / _plain(given), name)
+    tried = [usual]
     if origin is not None:
-        first, beside = _join(folders.sought[element.tag], name), _join(origin, name)
+        first = _join(_sought(element.tag, folders.main, compilers), name)
+        beside = _join(origin, name)
         tried += [first, beside]
-        path = usual if _is_there(first) else beside
-    return Asset(
-        element.tag,
-        place,
-        attribute,
-        name,
-        path,
-        tuple(tried),
-        "" if model else attribute_of_folder,
-        moved=path != usual or (model and not _plain(name).is_absolute()),
-    )
+        path = usual if is_there(first) else beside
+    return Asset(element, attribute, path, tuple(tried))
 
 
-def _is_there(path: Path) -> bool:
+def _given(compilers: list[dict[str, str]], name: str) -> str:
+    """The folder that several <compiler> give together: a later one has the last word."""
+    folder = ""
+    for attributes in compilers:
+        folder = attributes.get(name, attributes.get("assetdir", folder))
+    return folder
+
+
+def _sought(tag: str, main: Path, compilers: list[dict[str, str]]) -> Path:
+    """Where a name of an included file is tried first."""
+    last = {name: value for attributes in compilers for name, value in attributes.items()}
+    both = last.get("assetdir", "")
+    if tag == MODEL:
+        return Path.cwd()
+    kinds = {"mesh": "meshdir", "texture": "texturedir"}
+    folder = "" if tag == "flexcomp" else last.get(kinds.get(tag, ""), "") or both
+    return main / _plain(folder)
+
+
+def is_there(path: Path) -> bool:
+    """Whether a path leads to something."""
     try:
         path.stat()
     except (OSError, ValueError):

@@ -14,6 +14,12 @@ from xml.sax.saxutils import escape
 
 from mjcartpole.errors import ModelSyntaxError
 
+MOST_ELEMENTS: Final = 5_000
+"""Elements of a document."""
+
+DEEPEST: Final = 200
+"""Levels of elements inside each other."""
+
 _COMMENT: Final = re.compile(rb"<!--(.*?)-->", re.DOTALL)
 _SPACED_TAG: Final = re.compile(rb"<(\s+)(?=[A-Za-z])")
 
@@ -30,6 +36,7 @@ class Element:
         parent: The element around it; None for the root.
         start: Where its `<` is, in bytes.
         children: The elements in it, in order.
+        closes: Where its end tag, if it has one, was when the text was read.
     """
 
     tag: str
@@ -37,6 +44,7 @@ class Element:
     parent: "Element | None"
     start: int
     children: list["Element"] = field(default_factory=list)
+    closes: int = 0
 
     @property
     def name(self) -> str:
@@ -70,12 +78,14 @@ class Document:
     """
 
     root: Element
+    _elements: list[Element]
 
     def __init__(self, text: str) -> None:
         """Find the elements of a text.
 
         Raises:
-            ModelSyntaxError: It is not well-formed XML, though MuJoCo may be lenient.
+            ModelSyntaxError: It is not well-formed XML, though MuJoCo may be lenient, or has more
+                elements or levels of them than any cart-pole.
         """
         self._parse(text)
 
@@ -119,8 +129,21 @@ class Document:
         parent = self._follow(path)
         return next(child for child in parent.children if child.start == start)
 
+    def content(self, element: Element) -> tuple[int, int]:
+        """Where an element's content begins and ends; before the text is edited."""
+        end = self._tag_end(element)
+        return (end, end) if self._bytes[end - 2 : end] == b"/>" else (end, element.closes)
+
+    def span(self, element: Element) -> tuple[int, int]:
+        """Where an element begins and ends; before the text is edited."""
+        end = self._tag_end(element)
+        if self._bytes[end - 2 : end] != b"/>":
+            end = self._bytes.index(b">", element.closes) + 1
+        return self._bytes.rindex(b"<", 0, element.start + 1), end
+
     def _parse(self, text: str) -> None:
         stack: list[Element] = []
+        self._elements = []
         parser = expat.ParserCreate()
 
         def start(tag: str, attributes: dict[str, str]) -> None:
@@ -131,20 +154,27 @@ class Document:
             else:
                 parent.children.append(element)
             stack.append(element)
+            self._elements.append(element)
+            if len(self._elements) > MOST_ELEMENTS or len(stack) > DEEPEST:
+                raise ModelSyntaxError(
+                    f"it has more than {MOST_ELEMENTS} elements, or more than {DEEPEST} levels of "
+                    "them; a cart-pole needs a few dozen"
+                )
+
+        def end(_: str) -> None:
+            stack.pop().closes = parser.CurrentByteIndex
 
         def entity(*_: object) -> None:
-            raise ModelSyntaxError("the document declares XML entities, which MuJoCo does not know")
+            raise ModelSyntaxError("it declares XML entities, which MuJoCo does not know")
 
         parser.StartElementHandler = start
-        parser.EndElementHandler = lambda _: stack.pop()
+        parser.EndElementHandler = end
         parser.EntityDeclHandler = entity
         try:
             self._bytes = text.encode("utf-8")
             parser.Parse(made_strict(text), True)
         except (expat.ExpatError, UnicodeEncodeError) as error:
-            raise ModelSyntaxError(
-                f"the document cannot be edited, it is not well-formed XML: {error}"
-            ) from error
+            raise ModelSyntaxError(f"it is not well-formed XML: {error}") from error
 
     def _attributes(self, element: Element) -> Iterator[re.Match[bytes]]:
         position = element.start + 1 + len(element.tag.encode())
@@ -171,9 +201,10 @@ class Document:
         new = text.encode("utf-8")
         self._bytes = self._bytes[:start] + new + self._bytes[end:]
         moved = len(new) - (end - start)
-        for element in self.root.walk():
-            if element.start >= end:
-                element.start += moved
+        for element in reversed(self._elements):
+            if element.start < end:
+                break
+            element.start += moved
 
     def _path(self, element: Element) -> list[int]:
         path: list[int] = []

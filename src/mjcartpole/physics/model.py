@@ -10,7 +10,7 @@ import difflib
 import functools
 import os
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, TypeAlias
@@ -21,8 +21,9 @@ import numpy as np
 from mjcartpole import task
 from mjcartpole.errors import ConfigError, ModelNotFoundError, ModelSyntaxError
 from mjcartpole.physics.cache import remembered
+from mjcartpole.physics.guard import compile_document, one_line
 from mjcartpole.physics.library import all_digits
-from mjcartpole.physics.reading import read_text, stand_alone
+from mjcartpole.physics.reading import portable, read_text, read_whole
 from mjcartpole.physics.soundness import check_motion, check_numbers
 from mjcartpole.physics.structure import (
     check_directions,
@@ -72,6 +73,11 @@ class CartPole:
     def __repr__(self) -> str:
         name = self.name if len(self.name) <= 200 else f"{self.name[:200]}…"
         return f"CartPole({name!r}, {task.in_words(self.poles)}, timestep {self.timestep:g} s)"
+
+    @functools.cached_property
+    def stored(self) -> tuple[str, dict[str, Path | str]]:
+        """The document as a run stores it, and the files that lie beside it (see `portable`)."""
+        return portable(self.xml)
 
     @property
     def poles(self) -> int:
@@ -227,27 +233,38 @@ def load_named(document: str, name: str, *, own_timestep: bool = True) -> CartPo
 
 def _load_text(text: str, name: str, own_timestep: bool, path: Path | None = None) -> CartPole:
     """Load a document as it was written, of a file or of none; shared if it names no other file."""
+    folder, called = (path.parent, str(path)) if path else (Path(), name)
+
+    def load() -> CartPole:
+        return _find_parts(name, *_compile(text, called, folder), own_timestep)
+
     if _NAMES_FILE.search(text):
-        return _load_with_files(text, name, own_timestep, path)
-    found = remembered(
-        (text, own_timestep),
-        lambda: _find_parts(
-            name, stand_alone(text, name, Path()), _compile(text, name), own_timestep
-        ),
-    )
-    return dataclasses.replace(found, name=name)
+        return load()
+    return dataclasses.replace(remembered((text, own_timestep), load), name=name)
 
 
-def _load_with_files(
-    text: str, name: str, own_timestep: bool, path: Path | None = None
+def load_stored(
+    document: str,
+    name: str,
+    folder: Path,
+    allow_assets: Sequence[Path] = (),
+    *,
+    own_timestep: bool = False,
 ) -> CartPole:
-    """Load a document with includes, meshes and the like: beside its file, or the program."""
-    folder = path.parent if path else Path()
-    xml = stand_alone(text, name if path is None else str(path), folder)
-    # By a relative path MuJoCo does not find all files of included files, and the compiled model
-    # holds the paths of its files.
-    whole = path.parent.resolve() / path.name if path else None
-    return _find_parts(name, xml, _compile(xml, name, whole), own_timestep)
+    """Load a document that a run stores, which may have been made by somebody else.
+
+    Args:
+        document: The document.
+        name: What a person calls it.
+        folder: The run's folder; what the document names must lie in there.
+        allow_assets: Other folders in which it may lie.
+        own_timestep: See `load_model`.
+
+    Raises:
+        ModelError: It does not load, is no cart-pole, or names a file elsewhere.
+    """
+    inside = (folder, *allow_assets)
+    return _find_parts(name, *_compile(document, name, folder, inside), own_timestep)
 
 
 def with_options(
@@ -305,38 +322,40 @@ def _from_spec(spec: mujoco.MjSpec) -> tuple[str, str, mujoco.MjModel]:
     try:
         model = spec.compile()
     except (ValueError, mujoco.FatalError) as error:
-        raise ModelSyntaxError(f"the MjSpec does not compile: {_one_line(error)}") from error
+        raise ModelSyntaxError(f"the MjSpec does not compile: {one_line(str(error))}") from error
     with all_digits():
         text = spec.to_xml()
-    xml = stand_alone(text, "the MjSpec", Path(spec.modelfiledir))
+    xml = read_whole(text, "the MjSpec", Path(spec.modelfiledir)).text
     return spec.modelname or "the MjSpec", xml, model
 
 
-def _compile(text: str, name: str, path: Path | None = None) -> mujoco.MjModel:
-    """Compile a document; a path lets it refer to other files beside it."""
-    try:
-        if path is None:
-            return mujoco.MjModel.from_xml_string(text)
-        # As bytes: a name need not be text.
-        return mujoco.MjModel.from_xml_path(os.fsencode(path))
-    except (ValueError, mujoco.FatalError) as error:
-        raise ModelSyntaxError(f"{name} is not a valid MJCF: {_one_line(error)}") from error
-
-
-def _one_line(error: Exception) -> str:
-    message = " ".join(str(error).split())
-    return message.removeprefix("XML Error: ").removeprefix("Error: ")
+def _compile(
+    text: str, name: str, folder: Path, inside: Sequence[Path] | None = None
+) -> tuple[str, mujoco.MjModel]:
+    """The document, whole, and the compiled model."""
+    document = read_whole(text, name, folder, inside)
+    return document.text, compile_document(document, name)
 
 
 def same_model(a: mujoco.MjModel, b: mujoco.MjModel) -> bool:
-    """Whether two compiled models are equal in every number, name and option."""
-    return _bytes_of(a) == _bytes_of(b)
+    """Whether two compiled models are equal in every number, name and option.
+
+    Where their files lie makes no difference.
+    """
+    return dict(_values_of(a)) == dict(_values_of(b))
 
 
-def _bytes_of(model: mujoco.MjModel) -> bytes:
-    buffer = np.empty(mujoco.mj_sizeModel(model), dtype=np.uint8)
-    mujoco.mj_saveModel(model, None, buffer)
-    return buffer.tobytes()
+def _values_of(part: object, prefix: str = "") -> Iterator[tuple[str, object]]:
+    for name in dir(part):
+        value = getattr(part, name)
+        if name.startswith("_") or callable(value) or "path" in name or name == "nbuffer":
+            continue
+        if isinstance(value, np.ndarray):
+            yield prefix + name, (value.shape, value.tobytes())
+        elif isinstance(value, int | float | bytes):
+            yield prefix + name, value
+        else:
+            yield from _values_of(value, f"{prefix}{name}.")
 
 
 def self_contained(text: str, folder: Path) -> str:
@@ -348,7 +367,7 @@ def self_contained(text: str, folder: Path) -> str:
     Raises:
         ModelError: The document or an included file cannot be read.
     """
-    return stand_alone(text, "the XML document", folder)
+    return read_whole(text, "the XML document", folder).text
 
 
 def _find_parts(name: str, xml: str, model: mujoco.MjModel, own_timestep: bool) -> CartPole:

@@ -11,8 +11,14 @@ from mjcartpole import task
 from mjcartpole.errors import ModelError
 from mjcartpole.physics.bodies import HasJoints
 
-MOST_MEMORY: Final = 2**30
+MOST_MEMORY: Final = 2**29
 """Bytes that a model may ask for, for contacts and constraints."""
+
+LARGEST_MODEL: Final = 2**28
+"""Bytes of a compiled model, of which there are several copies in a process."""
+
+MOST_OBJECTS: Final = 5_000
+"""Bodies, joints, geoms, sites and all else that may have a name."""
 
 _MAY_BE_INFINITE: Final = {"jnt_range", "tendon_range"}
 """People write -inf and inf for a joint that turns freely; no limit is reached then."""
@@ -35,11 +41,22 @@ def check_numbers(name: str, model: mujoco.MjModel) -> None:
     Raises:
         ModelError: A number is NaN or infinite, or asks for endless work or memory.
     """
-    if model.narena > MOST_MEMORY:
-        raise ModelError(
-            f"{name} asks for {model.narena / 2**20:.0f} MB of working memory; no more than "
-            f"{MOST_MEMORY / 2**20:.0f} MB are given: look at memory, njmax and nconmax of <size>"
-        )
+    amounts = (
+        (
+            model.narena,
+            MOST_MEMORY,
+            "bytes of working memory",
+            "memory, njmax and nconmax of <size>",
+        ),
+        (model.nbuffer, LARGEST_MODEL, "bytes once compiled", "textures, meshes, height fields"),
+        # A map has twice as many places.
+        (model.nnames_map // 2, MOST_OBJECTS, "bodies, geoms and other parts", "counts"),
+    )
+    for amount, most, what, where in amounts:
+        if amount > most:
+            raise ModelError(
+                f"{name} has {amount:,} {what}; no more than {most:,} are taken: look at {where}"
+            )
     for field in ("iterations", "ls_iterations", "noslip_iterations", "ccd_iterations"):
         if getattr(model.opt, field) > MOST_ITERATIONS:
             raise ModelError(

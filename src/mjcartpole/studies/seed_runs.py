@@ -11,7 +11,7 @@ aggregate.json  statistics over the seeds
 import contextlib
 import dataclasses
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -96,21 +96,25 @@ def begin_seeds(
         FileError: The folder cannot be written.
     """
     runs.write_versions(folder)
-    write_whole(folder / runs.MODEL, cartpole.xml)
+    runs.write_model(folder, cartpole)
     about = {"preset": preset, "seeds": list(seeds), "config": dataclasses.asdict(config)}
     write_whole(folder / SEEDS, json.dumps(about, indent=2) + "\n")
 
 
 @contextlib.contextmanager
-def resumed_seeds(folder: Path) -> Iterator[ManyBegun]:
+def resumed_seeds(folder: Path, allow_assets: Sequence[Path] = ()) -> Iterator[ManyBegun]:
     """Hold a folder of many seeds whose work is to be continued.
+
+    Args:
+        folder: The folder.
+        allow_assets: Other folders in which the files of its model may lie.
 
     Raises:
         RunError: It is damaged, or another training is at work in it.
     """
     with locked_folder(folder):
         remove_leftovers(folder)
-        yield _load(folder)
+        yield _load(folder, allow_assets)
 
 
 def write_seeds(folder: Path, many: ManyResult) -> None:
@@ -161,16 +165,17 @@ def _clear(folder: Path) -> None:
         runs.remove_run(seed_folder(folder, seed))
     for name in FILES:
         (folder / name).unlink(missing_ok=True)
+    runs.remove_assets(folder)
 
 
-def _load(folder: Path) -> ManyBegun:
+def _load(folder: Path, allow_assets: Sequence[Path] = ()) -> ManyBegun:
     path = folder / SEEDS
     try:
         about: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
         config = TrainConfig(**about["config"])
         seeds = tuple(int(seed) for seed in about["seeds"])
         document = (folder / runs.MODEL).read_text(encoding="utf-8")
-        cartpole = runs.stored_model(document, config)
+        cartpole = runs.stored_model(document, config, folder, allow_assets)
         preset = str(about["preset"])
     except (OSError, ValueError, TypeError, KeyError, ConfigError, ModelError) as error:
         raise RunError(

@@ -22,7 +22,7 @@ from mjcartpole.learning.engine import Engine, choose_engine
 from mjcartpole.learning.session import CHECKPOINT_EVERY, Session
 from mjcartpole.learning.training import Training, TrainResult
 from mjcartpole.physics.batch_simulation import available_cores
-from mjcartpole.physics.model import CartPole, load_model
+from mjcartpole.physics.model import CartPole, load_model, load_named
 from mjcartpole.studies.conduct import conclude, evaluate_where_trained
 from mjcartpole.studies.evaluation import Evaluation
 from mjcartpole.studies.statistics import Aggregate, aggregate
@@ -104,6 +104,7 @@ class _Job:
     preset: str
     every: float
     events: bool
+    allow_assets: tuple[Path, ...]
 
 
 class Crew:
@@ -126,6 +127,7 @@ class Crew:
         preset: str = "tuned",
         every: float = CHECKPOINT_EVERY,
         events: bool = False,
+        allow_assets: tuple[Path, ...] = (),
     ) -> None:
         """Plan the work.
 
@@ -139,6 +141,7 @@ class Crew:
             preset: Name of the preset that the config began from.
             every: Seconds between two checkpoints of a run.
             events: Write TensorBoard events for each run.
+            allow_assets: Folders in which the files of the models of runs that go on may lie.
 
         Raises:
             ConfigError: The seeds or workers make no sense.
@@ -157,6 +160,7 @@ class Crew:
                 preset=preset,
                 every=every,
                 events=events,
+                allow_assets=allow_assets,
             )
             for seed in self.seeds
         ]
@@ -285,7 +289,7 @@ def _train_seed(job: _Job, stop: Callable[[], bool]) -> SeedResult:
 def _model_of(job: _Job) -> CartPole:
     if job.document is None:
         return load_model()
-    return runs.stored_model(job.document, job.config)
+    return load_named(job.document, job.config.model, own_timestep=job.config.own_timestep)
 
 
 def _train_in_memory(job: _Job, cartpole: CartPole, stop: Callable[[], bool]) -> SeedResult:
@@ -324,7 +328,7 @@ def _train_on_disk(
 def _begun(job: _Job, folder: Path, cartpole: CartPole) -> Iterator[Checkpoint | None]:
     """Hold a seed's folder; yields where to go on."""
     if (folder / runs.CONFIG).is_file():
-        with runs.resumed_folder(folder) as begun:
+        with runs.resumed_folder(folder, job.allow_assets) as begun:
             if begun.config != job.config:
                 raise RunError(f"'{folder}' holds a run with another config")
             yield begun.checkpoint
