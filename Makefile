@@ -15,7 +15,7 @@ help:
 	@echo "make clean     remove the virtual environment and caches; runs and videos stay"
 
 train: $(VENV)/installed
-	$(BIN)/mjcartpole train --backend mujoco $(ARGS)
+	@$(BIN)/mjcartpole train --backend mujoco $(ARGS)
 
 test: lint
 	$(BIN)/python -m pytest -q -m "not slow"

@@ -20,7 +20,7 @@ from typing import Any, get_args
 import gymnasium
 import numpy as np
 from benchmarks.article import train_like_the_article
-from benchmarks.others import GymnasiumMujoco, dm_control_environment, raw_steps
+from benchmarks.others import GymnasiumMujoco, raw_steps
 from benchmarks.ratios import Ratio, compare, seconds
 from mujoco.batch import Batch
 
@@ -53,6 +53,9 @@ def _play(env: gymnasium.Env[Any, Any], steps: int) -> Callable[[], None]:
 
 
 def _play_dm(steps: int) -> Callable[[], None]:
+    # It does not come along on every Python.
+    from benchmarks.suite import dm_control_environment  # noqa: PLC0415
+
     env = dm_control_environment()
     signs = np.random.default_rng(0).choice([-1.0, 1.0], size=steps).tolist()
     actions = [np.array([sign]) for sign in signs]
@@ -76,8 +79,11 @@ def step(quick: bool) -> Iterator[Ratio]:
         ("env.step against CartPole-v1, bare", bare, _play(gyms.unwrapped, n), 1.8),
         ("env.step against CartPole-v1, as made by make", _play(ours, n), _play(gyms, n), 1.5),
         ("env.step, bare, against gymnasium's MujocoEnv", bare, _play(GymnasiumMujoco(), n), None),
-        ("env.step, bare, against dm_control's Environment", bare, _play_dm(n), None),
     ]
+    try:
+        cases.append(("env.step, bare, against dm_control's Environment", bare, _play_dm(n), None))
+    except ImportError as error:
+        print(f"  without dm_control: {error}")
     for name, mine, other, wanted in cases:
         yield compare("step", name, mine, other, repeats=repeats, wanted=wanted)
 

@@ -14,7 +14,6 @@ from hypothesis import strategies as st
 
 from mjcartpole import task
 from mjcartpole.cli import main
-from mjcartpole.envs import dm
 from mjcartpole.envs.cartpole import CartPoleEnv
 from mjcartpole.envs.vector import CartPoleVectorEnv
 from mjcartpole.errors import ConfigError, SimulationError
@@ -53,7 +52,7 @@ many_states = st.lists(st.floats(-1.5, 1.5), min_size=6, max_size=6)
 
 
 @given(masses, st.tuples(masses, lengths), st.tuples(masses, lengths), many_states)
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 def test_poles_beside_each_other_accelerate_as_wielands(cart, first, second, state):
     """Wieland (1991, doi:10.1109/IJCNN.1991.155416): each pole pulls the cart by itself.
 
@@ -75,7 +74,7 @@ def test_poles_beside_each_other_accelerate_as_wielands(cart, first, second, sta
 
 
 @given(masses, st.tuples(masses, lengths), st.tuples(masses, lengths), many_states)
-@settings(deadline=None, max_examples=50)
+@settings(max_examples=50)
 def test_a_pole_on_a_pole_accelerates_as_lagrange_says(cart, lower, upper, state):
     """In the angles against the vertical, of which a hinge's own is the difference."""
     (m1, length), (m2, l2) = lower, (upper[0], upper[1] / 2)
@@ -174,6 +173,7 @@ def test_an_episode_ends_when_one_of_them_has_fallen(state, over):
 @both
 @integrators
 def test_vector_and_dm_control_move_as_the_environment(model, integrator):
+    dm = pytest.importorskip("mjcartpole.envs.dm", exc_type=ImportError)
     env, vector = CartPoleEnv(model=model, integrator=integrator), None
     env.reset(seed=5)
     vector = CartPoleVectorEnv(2, model=model, integrator=integrator)
@@ -356,7 +356,7 @@ def test_gymnasiums_double_pendulum_is_taken_as_it_is():
     assert result.q_table.ndim == 7
 
 
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 @given(
     st.floats(0.05, 5),
     st.floats(0.01, 5),

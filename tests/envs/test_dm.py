@@ -10,14 +10,15 @@ import gymnasium
 import mujoco
 import numpy as np
 import pytest
-from absl.testing import absltest
-from dm_env import specs, test_utils
 
 import mjcartpole
 from mjcartpole.errors import ConfigError, ModelNotFoundError
 from mjcartpole.physics.model import load_model
 
 dm = pytest.importorskip("mjcartpole.envs.dm", exc_type=ImportError)
+# They come along with dm_control.
+from absl.testing import absltest  # noqa: E402
+from dm_env import specs, test_utils  # noqa: E402
 
 FRICTION = """<mujoco><option gravity="0 0 -9.8" timestep="0.005" integrator="implicitfast"/>
 <worldbody><body name="wagon">

@@ -103,7 +103,7 @@ def test_single_environments_can_still_be_put_together():
 
 @pytest.mark.parametrize("integrator", ["gym", "mujoco"])
 @pytest.mark.parametrize("name", MODELS)
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=6)
 @given(
     seed=st.integers(0, 2**31),
     threads=st.sampled_from([1, 2, None]),
@@ -178,7 +178,7 @@ def test_threads_change_no_bit(name, integrator):
     ("integrator", "kinematics"), [("gym", "euler"), ("mujoco", "semi-implicit")]
 )
 @given(seed=st.integers(0, 2**31), n=st.integers(1, 12))
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 def test_equal_to_gymnasiums_vector(sutton_barto, integrator, kinematics, seed, n):
     arguments = {"num_envs": n, "max_episode_steps": 30, "sutton_barto_reward": sutton_barto}
     envs = gymnasium.make_vec(ENV_ID, integrator=integrator, **arguments)

@@ -144,7 +144,7 @@ def test_every_length_but_the_right_one_is_refused(content, scratch):
         assert_refused(scratch)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(data=st.data())
 def test_no_change_is_accepted(data, content, scratch):
     start = data.draw(st.integers(0, len(content)))
@@ -157,7 +157,7 @@ def test_no_change_is_accepted(data, content, scratch):
         assert_refused(scratch)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(noise=st.binary(max_size=2000))
 def test_noise_is_refused_even_with_a_right_checksum(noise, scratch):
     for start in (b"", HEAD, HEAD + hashlib.sha256(noise).hexdigest().encode() + b"\n"):

@@ -177,7 +177,7 @@ def configs(draw):
 
 
 @given(configs())
-@settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=60, suppress_health_check=list(HealthCheck))
 def test_any_config_gives_the_same_bits(config):
     found = assert_engines_agree(config)
     assert len(found["returns"]) == config.episodes
@@ -230,7 +230,7 @@ def numbers(low, high):
     ),
     st.sampled_from(["gym", "mujoco"]),
 )
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_any_numbers_in_a_model_give_the_same_bits(values, integrator):
     changes = [(old, f'{old.split("=")[0]}="{value}"') for old, value in values.items()]
     config = TrainConfig(episodes=25, integrator=integrator, td_lambda=None)

@@ -24,7 +24,7 @@ from mjcartpole.learning.discretizer import Discretizer
 from mjcartpole.physics import cartpole_v1
 from mjcartpole.physics.simulation import LARGEST_SANE
 
-quick = settings(deadline=None, max_examples=200)
+quick = settings(max_examples=200)
 
 
 def bits(*values):

@@ -5,7 +5,7 @@ import re
 
 import hypothesis.strategies as st
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 
 from mjcartpole.learning import naming
 from mjcartpole.learning.config import PRESETS, TrainConfig
@@ -50,14 +50,12 @@ def test_a_preset_alone_is_named_alone(preset):
     assert in_flags(preset, config) == ""
 
 
-@settings(deadline=None)
 @given(configs, configs)
 def test_settings_have_names_of_their_own(one, other):
     names = [run_name("tuned", config).casefold() for config in (one, other)]
     assert (names[0] == names[1]) == (one == other)
 
 
-@settings(deadline=None)
 @given(configs, st.sampled_from(list(PRESETS)), st.integers(2, 100_000))
 def test_a_name_is_short_and_legal_everywhere(config, preset, seeds):
     for name in (run_name(preset, config), run_name(preset, config, seeds)):

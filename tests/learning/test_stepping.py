@@ -21,7 +21,7 @@ from mjcartpole.physics.library import libmujoco
 from mjcartpole.physics.model import load_model
 from mjcartpole.physics.simulation import LARGEST_SANE, Simulation, check_sane
 
-quick = settings(max_examples=200, deadline=None)
+quick = settings(max_examples=200)
 state_values = st.floats() | st.sampled_from(
     [
         *(sign * limit for sign in (1, -1) for limit in (task.X_LIMIT, task.THETA_LIMIT)),

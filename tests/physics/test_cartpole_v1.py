@@ -36,7 +36,7 @@ anything = st.floats(-1e100, 1e100)
 
 
 @given(st.tuples(*[anything] * 4), st.integers(0, 1))
-@settings(max_examples=500, deadline=None)
+@settings(max_examples=500)
 @example((0.0, -0.0, -0.0, 0.0), 0)
 @example((2.4, 1e-310, 0.2095, -5e-324), 1)
 def test_any_state_moves_as_in_gymnasium(state, action):

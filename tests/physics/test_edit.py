@@ -153,7 +153,7 @@ def test_what_does_not_compile_is_the_loaders_error():
 KEYS = [*EDIT_NAMES, "joint:hinge.damping", "option.integrator", "geom:pole.size", "default.geom.x"]
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(st.text(max_size=12) | st.sampled_from(KEYS), st.none() | st.floats() | st.text(max_size=8))
 def test_anything_gives_a_document_or_one_clear_line(key, value):
     try:

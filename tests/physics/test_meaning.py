@@ -96,7 +96,7 @@ def rod(edits):
 # --- the physics that was asked for -------------------------------------------------------------
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(EDITS, st.randoms())
 def test_any_edits_in_any_order_give_the_analytic_rod(edits, random):
     at_once = edit_document(REFERENCE, edits)
@@ -112,14 +112,14 @@ def test_any_edits_in_any_order_give_the_analytic_rod(edits, random):
     assert beyond_equations(load_model(at_once, own_timestep=True)) == []
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(EDITS, EDITS)
 def test_the_last_edit_decides(first, second):
     text = edit_document(edit_document(REFERENCE, first), second)
     assert differences(parameters(text), rod({**first, **second}), rtol=1e-12) == []
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(EDITS)
 def test_the_pole_is_drawn_as_long_as_it_is(edits):
     text = edit_document(REFERENCE, edits)
@@ -187,7 +187,7 @@ def test_a_rod_written_with_six_digits_becomes_exact():
 # --- other models -------------------------------------------------------------------------------
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(number(0.1, 10), number(0.01, 10), number(0.01, 10), number(0.1, 100))
 def test_geoms_are_scaled_where_they_decide_the_mass(length, mass, cart, force):
     edits = {"pole.length": length, "pole.mass": mass, "cart.mass": cart, "force": force}

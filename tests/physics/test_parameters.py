@@ -156,7 +156,7 @@ poles = st.builds(
 )
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(st.one_of(rods, poles))
 def test_parameters_come_back_to_the_last_digit_and_move_the_same(p):
     cartpole = build(p)

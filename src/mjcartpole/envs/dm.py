@@ -25,10 +25,14 @@ try:
         from dm_control.mujoco import wrapper
         from dm_control.rl import control
         from dm_env import specs  # type: ignore[import-untyped]
+
+        # Its list of MuJoCo's fields may be another version's, which shows at the first model.
+        mujoco.Physics.from_xml_string("<mujoco/>")
 except Exception as error:
     _why = " ".join(f"{type(error).__name__}: {error}".split())
     raise ImportError(
-        f"mjcartpole.envs.dm needs dm_control, which does not load: {_why}"
+        f"mjcartpole.envs.dm needs dm_control, which does not load: {_why}; it comes along "
+        "on Python 3.11 and 3.12, and fits MuJoCo below 4"
     ) from error
 
 TASKS: Final = ("balance",)
