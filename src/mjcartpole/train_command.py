@@ -28,6 +28,7 @@ from mjcartpole.learning.documents import CONFIG
 from mjcartpole.learning.engine import Engine, compiling
 from mjcartpole.learning.folders import SEEDS, free_folder
 from mjcartpole.learning.naming import in_flags, namesakes, run_name
+from mjcartpole.learning.run_model import check_storable
 from mjcartpole.learning.session import CHECKPOINT_EVERY, Session, check_interval
 from mjcartpole.learning.training import Training, TrainResult
 from mjcartpole.physics.model import CartPole
@@ -183,7 +184,7 @@ def _prepare(config: TrainConfig, how: How) -> CartPole:
     _check(how)
     cartpole = config.load_model()
     config.discretizer(cartpole.poles)
-    runs.check_storable(cartpole)
+    check_storable(cartpole)
     why = why_unplayable(cartpole, config.integrator) if config.backend == "mujoco" else None
     if why:
         print(f"mjcartpole: {why}", file=sys.stderr)

@@ -8,7 +8,7 @@ import json
 import pytest
 
 from mjcartpole.errors import CheckpointError, FileError, ModelError, PolicyFileError, RunError
-from mjcartpole.learning import documents, folders, runs
+from mjcartpole.learning import documents, folders, run_model, runs
 from mjcartpole.learning.checkpoints import LATEST, PREVIOUS
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.session import Session
@@ -111,7 +111,7 @@ def test_free_folders_are_counted(tmp_path):
     assert folders.free_folder(tmp_path, "a").name == "a-3"
 
 
-@pytest.mark.parametrize("name", [documents.CONFIG, runs.MODEL, runs.POLICY])
+@pytest.mark.parametrize("name", [documents.CONFIG, run_model.MODEL, runs.POLICY])
 def test_a_missing_file_is_named(run, name):
     (run / name).unlink()
     with pytest.raises(RunError, match=f"{name} missing"):
@@ -149,10 +149,10 @@ def test_a_model_is_stored_as_long_as_its_other_files_are_there(tmp_path):
     text = text.replace('<body name="pole">', '<body name="pole"><geom type="mesh" mesh="m"/>')
     (tmp_path / "mesh.xml").write_text(text, encoding="utf-8")
     cartpole = load_model(tmp_path / "mesh.xml")
-    runs.check_storable(cartpole)
+    run_model.check_storable(cartpole)
     (tmp_path / "m.obj").unlink()
     with pytest.raises(ModelError, match=r"a file of the model cannot be read: .*m\.obj"):
-        runs.check_storable(dataclasses.replace(cartpole))
+        run_model.check_storable(dataclasses.replace(cartpole))
 
 
 def test_a_run_with_a_mesh_is_continued_elsewhere(tmp_path):
@@ -286,7 +286,7 @@ def test_a_run_is_complete_when_its_checkpoints_are_gone(begun, result):
     assert runs.is_complete(begun)
     assert sorted(path.name for path in begun.iterdir()) == sorted(runs.FILES)
     assert documents.read_summary(begun) == SUMMARY
-    assert runs.check_complete(begun) == (result.config, SUMMARY["evaluation"])
+    assert runs.check_complete(begun).config == result.config
     assert runs.load_run(begun).preset == "article"
 
 
@@ -324,7 +324,7 @@ def test_removing_a_run_removes_nothing_else(begun):
     runs.remove_run(begun)
 
 
-@pytest.mark.parametrize("left", [[], [runs.VERSIONS], [runs.VERSIONS, runs.MODEL]])
+@pytest.mark.parametrize("left", [[], [runs.VERSIONS], [runs.VERSIONS, run_model.MODEL]])
 def test_what_a_kill_in_the_first_moment_leaves_is_no_obstacle(left, tmp_path, result):
     for name in left:
         (tmp_path / name).write_text("left by a kill")
@@ -351,14 +351,14 @@ def test_files_of_somebody_else_are_never_taken(names, overwrite, tmp_path):
 def test_a_stored_model_is_never_taken_for_a_name_or_a_path(document, begun, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "elsewhere.xml").write_text("a secret")
-    (begun / runs.MODEL).write_text(document)
-    with pytest.raises(ModelError, match="the stored model is not a valid MJCF") as refused:
+    (begun / run_model.MODEL).write_text(document)
+    with pytest.raises(ModelError, match=r"model\.xml' is not a valid MJCF") as refused:
         resumed(begun)
     assert "secret" not in str(refused.value)
 
 
 def test_a_complete_run_is_read_before_it_is_said_to_be_so(run, result):
-    assert runs.check_complete(run) == (result.config, SUMMARY["evaluation"])
+    assert runs.check_complete(run).config == result.config
     summary = run / documents.SUMMARY
     for change, why in (
         ({"interrupted": True}, "not over"),

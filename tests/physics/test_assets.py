@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 
 from mjcartpole.errors import ModelError, ModelNotFoundError
-from mjcartpole.learning.runs import check_storable, write_model
+from mjcartpole.learning.run_model import check_storable, write_model
 from mjcartpole.physics.assets import is_stored
 from mjcartpole.physics.model import load_model, load_stored, same_model, self_contained
 

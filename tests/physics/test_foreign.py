@@ -14,7 +14,7 @@ import pytest
 from mjcartpole.envs.cartpole import CartPoleEnv
 from mjcartpole.errors import ModelError, ModelNotFoundError, ModelSyntaxError, NotACartPoleError
 from mjcartpole.learning.config import TrainConfig
-from mjcartpole.learning.runs import check_storable
+from mjcartpole.learning.run_model import check_storable
 from mjcartpole.learning.training import train
 from mjcartpole.media.renderer import open_renderer
 from mjcartpole.physics.describe import describe

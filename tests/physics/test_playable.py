@@ -37,7 +37,7 @@ COARSE = {
     "steps of 0.1 s": ("cartpole", {"option.timestep": 0.1}),
 }
 PLAYABLE = {
-    "a strong force": ("cartpole", {"force": 60}),
+    "a strong force": ("cartpole", {"force": 40}),
     "a small force": ("cartpole", {"force": 1}),
     "100 substeps": ("cartpole", {"timestep": 2e-4}),
     "a wind that the motor masters": ("cartpole", {"option.gravity": "2 0 -9.8", "force": 3}),

@@ -18,23 +18,18 @@ import fnmatch
 import json
 import os
 import platform
-import shutil
-import tempfile
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from mjcartpole.errors import ModelError, RunError
+from mjcartpole.errors import RunError
 from mjcartpole.files import (
-    brief,
     is_file,
     is_folder,
     is_temporary,
     names_in,
-    read_bytes,
     remove,
-    replacing,
     write_whole,
 )
 from mjcartpole.learning.checkpoints import (
@@ -48,12 +43,20 @@ from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.documents import CONFIG, SUMMARY, read_config, read_figures
 from mjcartpole.learning.folders import LOCK, held_folder, locked_folder
 from mjcartpole.learning.policy import Policy
+from mjcartpole.learning.run_model import (
+    MODEL,
+    read_document,
+    read_model,
+    remove_assets,
+    stored_model,
+    write_model,
+)
 from mjcartpole.learning.training import TrainResult
-from mjcartpole.physics.assets import is_stored, name_by_content
-from mjcartpole.physics.model import CartPole, load_stored, same_model
+from mjcartpole.physics.assets import is_stored
+from mjcartpole.physics.model import CartPole, load_stored
 from mjcartpole.versions import version_of
 
-VERSIONS, MODEL = "versions.json", "model.xml"
+VERSIONS: Final = "versions.json"
 EPISODES, POLICY, TIMING = "episodes.csv", "policy.json", "timing.json"
 BEGINNING: Final = (VERSIONS, MODEL, CONFIG)
 """In the order of writing: what a kill leaves of them is known by the versions."""
@@ -61,9 +64,6 @@ RESULTS: Final = (EPISODES, POLICY, TIMING, SUMMARY)
 FILES: Final = (*BEGINNING, *RESULTS)
 EVENTS: Final = "events.out.tfevents.*"
 """TensorBoard's (see tensorboard.py)."""
-
-_LARGEST_MODEL: Final = 2**24
-"""Bytes."""
 
 PACKAGES: Final = ("mjcartpole", "mujoco", "dm-control", "gymnasium", "numpy", "numba", "imageio")
 
@@ -102,7 +102,7 @@ class Run:
             ModelError: It cannot be used, or names a file elsewhere.
         """
         return load_stored(
-            _read_document(self.folder),
+            read_document(self.folder),
             str(self.model),
             self.folder,
             allow_assets,
@@ -157,22 +157,6 @@ def claimed_folder(folder: Path, *, overwrite: bool = False) -> Iterator[None]:
                 remove_assets(folder)
 
 
-def check_storable(cartpole: CartPole) -> None:
-    """Refuse a model that is another one when it is read back from what a run stores.
-
-    Raises:
-        ModelError: It is, or a file that it needs cannot be read.
-    """
-    with tempfile.TemporaryDirectory() as temporary:
-        write_model(Path(temporary), cartpole)
-        again = load_stored(cartpole.stored[0], cartpole.name, Path(temporary), own_timestep=True)
-    if not same_model(again.model, cartpole.model):
-        raise ModelError(
-            f"{cartpole.name} compiles to another model when its document stands alone; "
-            "make it one self-contained file"
-        )
-
-
 def begin_run(
     folder: Path, config: TrainConfig, cartpole: CartPole, *, preset: str, video: bool = False
 ) -> None:
@@ -186,34 +170,6 @@ def begin_run(
     write_model(folder, cartpole)
     about = {"preset": preset, "video": video, **dataclasses.asdict(config)}
     write_whole(folder / CONFIG, _json(about))
-
-
-def write_model(folder: Path, cartpole: CartPole) -> None:
-    """Write a model's document, and beside it the files that it names.
-
-    Raises:
-        FileError: The folder cannot be written, or a file cannot be read.
-        ModelError: A file cannot be read.
-    """
-    document, files = cartpole.stored
-    for name, source in files.items():
-        if isinstance(source, str):
-            write_whole(folder / name, source)
-        elif not _has(folder / name):
-            with replacing(folder / name) as temporary:
-                shutil.copyfile(source, temporary)
-    write_whole(folder / MODEL, document)
-
-
-def _has(asset: Path) -> bool:
-    """Whether a file is there whole; a model may have been loaded from this very folder."""
-    return asset.is_file() and not asset.is_symlink() and name_by_content(asset) == asset.name
-
-
-def remove_assets(folder: Path, keep: Iterable[str] = ()) -> None:
-    """Remove the files that a model named, but for some."""
-    names = {path.name for path in folder.glob("asset-*") if is_stored(path.name)}
-    _remove(folder, names - set(keep))
 
 
 def write_results(folder: Path, result: TrainResult, summary: dict[str, Any]) -> None:
@@ -308,7 +264,7 @@ def load_run(folder: str | os.PathLike[str]) -> Run:
         raise RunError(f"'{path}' is no complete run folder: {', '.join(missing)} missing{hint}")
     policy = Policy.load(path / POLICY, follow=False)
     preset, _, config = read_config(path)
-    _read_document(path)
+    read_document(path)
     return Run(path, preset, config, policy)
 
 
@@ -342,52 +298,9 @@ def resumed_folder(path: Path, allow_assets: Sequence[Path] = ()) -> Iterator[Be
         yield begun
 
 
-def stored_model(
-    document: str, config: TrainConfig, folder: Path, allow_assets: Sequence[Path] = ()
-) -> CartPole:
-    """The model of a run from the document that it stores, under the name that was trained on.
-
-    Args:
-        document: The document.
-        config: The run's.
-        folder: The run's.
-        allow_assets: Other folders in which the files that it names may lie.
-
-    Raises:
-        ModelError: The document was damaged, or names a file elsewhere.
-    """
-    # Never by `load_model`, which would take some texts for a model's name or a path.
-    cartpole = load_stored(
-        document,
-        f"'{folder / MODEL}'",
-        folder,
-        allow_assets,
-        own_timestep=config.own_timestep,
-    )
-    return dataclasses.replace(cartpole, name=config.model)
-
-
-def read_model(folder: Path, config: TrainConfig, allow_assets: Sequence[Path] = ()) -> CartPole:
-    """The model that a run folder stores; see `stored_model`.
-
-    Raises:
-        RunError: It cannot be read.
-        ModelError: It was damaged, or names a file elsewhere.
-    """
-    return stored_model(_read_document(folder), config, folder, allow_assets)
-
-
-def _read_document(folder: Path) -> str:
-    content = read_bytes(folder / MODEL, _LARGEST_MODEL, refusal=RunError)
-    try:
-        return content.decode("utf-8")
-    except UnicodeDecodeError as error:
-        raise RunError(f"'{folder / MODEL}' cannot be read: {brief(error)}") from error
-
-
 def _load_begun(folder: Path, path: Path, allow_assets: Sequence[Path]) -> Begun:
     preset, video, config = read_config(folder)
-    document = _read_document(folder)
+    document = read_document(folder)
     cartpole = stored_model(document, config, folder, allow_assets)
     checkpoint = choose_checkpoint(folder, path, config, document, poles=cartpole.poles)
     return Begun(folder, preset, video, config, cartpole, checkpoint)

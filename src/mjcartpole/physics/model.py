@@ -345,10 +345,14 @@ def same_model(a: mujoco.MjModel, b: mujoco.MjModel) -> bool:
     return dict(_values_of(a)) == dict(_values_of(b))
 
 
+_NO_VALUES: Final = {"nbuffer", "signature"}
+"""Of a compiled model: they go with the length of paths, and are lost in a pickle."""
+
+
 def _values_of(part: object, prefix: str = "") -> Iterator[tuple[str, object]]:
     for name in dir(part):
         value = getattr(part, name)
-        if name.startswith("_") or callable(value) or "path" in name or name == "nbuffer":
+        if name.startswith("_") or callable(value) or "path" in name or name in _NO_VALUES:
             continue
         if isinstance(value, np.ndarray):
             yield prefix + name, (value.shape, value.tobytes())

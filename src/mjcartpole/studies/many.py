@@ -3,9 +3,9 @@
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from mjcartpole.learning import runs
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.engine import Engine
+from mjcartpole.learning.run_model import check_storable
 from mjcartpole.studies import seed_runs
 from mjcartpole.studies.seeds import Crew, ManyResult, SeedResult
 
@@ -47,7 +47,7 @@ def train_many(
     if run_dir is None:
         crew = Crew(config, seeds, cartpole, workers=workers, engine=engine)
         return _finished(crew, crew.run(_never))
-    runs.check_storable(cartpole)
+    check_storable(cartpole)
     crew = Crew(
         config, seeds, cartpole, workers=workers, engine=engine, folder=run_dir, preset="custom"
     )

@@ -21,12 +21,13 @@ from mjcartpole.files import is_file, remove, write_whole
 from mjcartpole.learning import runs
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.folders import SEEDS, check_here, held_folder, locked_folder
+from mjcartpole.learning.run_model import MODEL, read_model, remove_assets, write_model
 from mjcartpole.learning.stored import Fields, read_document
 from mjcartpole.physics.model import CartPole
 from mjcartpole.studies.seeds import ManyResult, check_seeds, seed_folder
 
 TABLE, AGGREGATE = "seeds.csv", "aggregate.json"
-FILES: Final = (SEEDS, TABLE, AGGREGATE, runs.MODEL, runs.VERSIONS)
+FILES: Final = (SEEDS, TABLE, AGGREGATE, MODEL, runs.VERSIONS)
 """In the order of removal: without the seeds a folder holds nothing, and the versions say whose."""
 
 _FIELDS: Final[Fields] = {"preset": str, "seeds": tuple[int, ...], "config": TrainConfig.fields()}
@@ -94,7 +95,7 @@ def begin_seeds(
         FileError: The folder cannot be written.
     """
     runs.write_versions(folder)
-    runs.write_model(folder, cartpole)
+    write_model(folder, cartpole)
     about = {"preset": preset, "seeds": list(seeds), "config": dataclasses.asdict(config)}
     write_whole(folder / SEEDS, json.dumps(about, indent=2) + "\n")
 
@@ -112,7 +113,7 @@ def resumed_seeds(folder: Path, allow_assets: Sequence[Path] = ()) -> Iterator[M
     """
     with locked_folder(folder):
         preset, config, seeds = _read_seeds(folder)
-        cartpole = runs.read_model(folder, config, allow_assets)
+        cartpole = read_model(folder, config, allow_assets)
         yield ManyBegun(preset, config, seeds, cartpole)
 
 
@@ -168,7 +169,7 @@ def _clear(folder: Path) -> None:
             runs.remove_run(each)
     for name in FILES:
         remove(folder / name)
-    runs.remove_assets(folder)
+    remove_assets(folder)
 
 
 def _read_seeds(folder: Path) -> tuple[str, TrainConfig, tuple[int, ...]]:
