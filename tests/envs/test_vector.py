@@ -28,6 +28,7 @@ from mjcartpole.errors import (
     ModelNotFoundError,
     RenderError,
     ResetNeededError,
+    SettingError,
     SimulationError,
 )
 from mjcartpole.physics.model import load_model
@@ -507,6 +508,19 @@ def test_what_mujoco_gives_up_on_is_an_error_of_ours(integrator, threads):
     with pytest.raises(SimulationError, match="MuJoCo gave up on"):
         for _ in range(10):
             envs.step(np.ones(8, dtype=int))
+
+
+def test_names_of_cartpole_v1_are_read_and_not_set_in_vain():
+    envs = gymnasium.make_vec(ENV_ID, num_envs=2, edits=["pole.length=1.5"]).unwrapped
+    assert (envs.length, envs.masspole, envs.gravity, envs.tau) == (0.75, 0.1, 9.8, 0.02)
+    assert (envs.x_threshold, envs.theta_threshold_radians) == (2.4, 12 * 2 * np.pi / 360)
+    for name in ("length", "gravity", "x_threshold", "lenght"):
+        with pytest.raises(SettingError, match="many environments cannot be set; make them with"):
+            setattr(envs, name, 5.0)
+    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+        _ = envs.nothing
+    envs.own_note = "kept"
+    assert envs.own_note == "kept"
 
 
 def test_edits_may_be_texts():

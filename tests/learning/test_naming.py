@@ -34,7 +34,7 @@ configs = st.fixed_dictionaries(
         "learn_last_step": st.booleans(),
         "log_every": st.integers(1, 10**9),
         "bins": st.sampled_from([(1, 3, 6, 8), (13, 6, 8, 1), (1, 1, 36, 8)]),
-        "seed": st.integers(0, 10**40),
+        "seed": st.integers(0, 2**128 - 1),
     },
 ).map(lambda changes: TrainConfig(**changes))
 

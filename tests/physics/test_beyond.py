@@ -76,13 +76,12 @@ def rigged(text):
             [plus(SLIDER, 'damping="0 1"')],
             "damping of joint 'slider' is not proportional to the velocity",
         ),
-        ([plus(CART, 'gravcomp="1"')], "gravity compensation of body 'cart'"),
+        ([plus(POLE, 'gravcomp="1"')], "gravity compensation of body 'pole'"),
         (
             [plus(OPTION, 'density="1.2" wind="1 0 0"')],
             "a fluid around it (option density 1.2 and wind)",
         ),
         ([plus(OPTION, 'viscosity="0.1"')], "a fluid around it (option viscosity 0.1)"),
-        ([flag('sleep="enable"')], "sleeping of what is at rest (option flag)"),
         (
             [('<motor (.*?) gear="10"', r'<position \1 kp="10"')],
             "spring (a servo's feedback of the position) of actuator 'push'",
@@ -122,6 +121,31 @@ def test_an_actuator_without_input_is_seen_by_its_force(place, joint, unit):
     )
     assert cartpole.controls == (-1.0, 1.0)
     assert read_parameters(cartpole).forces == (-10.0, 10.0)
+
+
+@pytest.mark.parametrize(
+    ("option", "said"),
+    [
+        ('solver="PGS"', "the solver PGS"),
+        ('noslip_iterations="3"', "3 noslip iterations"),
+        ('iterations="1"', "a solver that ends after 1 iterations"),
+        ('ls_iterations="2"', "a solver that ends after 2 ls_iterations"),
+    ],
+)
+def test_dry_friction_that_is_not_solved_to_the_end_is_named(option, said):
+    rough = changed(plus(OPTION, option), plus(SLIDER, 'frictionloss="1"'))
+    assert beyond_equations(rough) == [f"friction loss in joint 'slider' by {said}"]
+    assert beyond_equations(changed(plus(OPTION, option))) == []
+
+
+def test_what_has_no_force_here_is_not_named():
+    assert beyond_equations(changed(plus(CART, 'gravcomp="1"'))) == []
+    asleep = flag('sleep="enable"')
+    assert beyond_equations(changed(asleep)) == []
+    allowed = plus(CART, 'sleep="allowed"')
+    assert beyond_equations(changed(asleep, allowed)) == [
+        "sleeping of what is at rest (option flag)"
+    ]
 
 
 def test_a_force_of_a_kind_that_nobody_listed_is_seen(monkeypatch):
@@ -252,7 +276,7 @@ def test_steps_that_are_not_eulers_are_named():
     damped = changed(flag('eulerdamp="disable"'), plus(HINGE, 'damping="1"'))
     assert beyond_step(damped) == ["integrator Euler without eulerdamp instead of Euler"]
     assert beyond_step(damped, method_of(damped)) == []
-    rubbing = changed(('"Euler"', '"discrete"'), plus(HINGE, 'frictionloss="1"'))
+    rubbing = changed(('"Euler"', '"discrete"'), plus(SLIDER, 'frictionloss="1"'))
     assert beyond_step(rubbing, method_of(rubbing)) == [
         "friction that the integrator discrete solves in its own way"
     ]
@@ -262,12 +286,14 @@ def test_numbers_that_no_episode_feels():
     assert idle_numbers(load_model()) == []
     unfelt = changed(
         plus(SLIDER, 'range="-2.4 3"'),
-        plus(HINGE, 'damping="1"'),
-        flag('damper="disable" gravity="disable"'),
+        plus(HINGE, 'damping="1" stiffness="2" frictionloss="3"'),
+        flag('damper="disable" gravity="disable" spring="disable" frictionloss="disable"'),
     )
     assert idle_numbers(unfelt) == [
         "limit of joint 'slider' at -2.4 and 3",
         "damping of joint 'hinge', switched off by an option flag",
+        "stiffness of joint 'hinge', switched off by an option flag",
+        "friction loss of joint 'hinge', switched off by an option flag",
         "gravity, switched off by an option flag",
     ]
     assert differs_from(unfelt) == ["gravity 0 instead of 9.8"]

@@ -207,6 +207,14 @@ def test_motion_and_numbers_have_verdicts_of_their_own(name, tmp_path, capsys):
         assert code == 0, out
 
 
+@pytest.mark.parametrize("height", ["0", "1e-14", "1e-9", "1e-6", "-1e-7"])
+def test_a_pole_that_is_balanced_on_its_hinge(height):
+    text = changed((POLE, POLE.replace('"0 0 0.5"', f'"0 0 {height}"')))
+    subject, results = climb(text, "itself", (2, 3, 4, 6, 9))
+    assert failures(results) == set()
+    assert subject.beyond == []
+
+
 UPS = {
     "y up": ("0 -9.8 0", "1 0 0", "0 0 1", "0 0.5 0"),
     "y up, turned round": ("0 -9.8 0", "1 0 0", "0 0 -1", "0 0.5 0"),

@@ -1,7 +1,6 @@
 """CartPole-v1 with MuJoCo underneath, as a `gymnasium.Env`."""
 
 import copy
-import functools
 from collections.abc import Callable
 from typing import Any, Self
 
@@ -15,8 +14,7 @@ from mjcartpole import task
 from mjcartpole.envs.editable import Editable
 from mjcartpole.envs.names import CartPoleNames, refuse_slip
 from mjcartpole.envs.options import USUAL, reset_options
-from mjcartpole.envs.pictures import Pictures, RenderMode
-from mjcartpole.envs.registration import ENV_ID
+from mjcartpole.envs.pictures import Pictures, RenderMode, warn_without_mode
 from mjcartpole.envs.spec import portable
 from mjcartpole.errors import InvalidActionError, ResetNeededError
 from mjcartpole.integrator import Integrator
@@ -227,7 +225,7 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int], CartPo
         observation = np.zeros(4, dtype=np.float32)
         # A view that takes single floats several times faster than the array does.
         cells: memoryview[float] = observation.data.cast("B").cast("f")
-        observe = observation.copy if poles == 1 else functools.partial(_observe, simulation)
+        observe = observation.copy if poles == 1 else simulation.observe
         self._at_hand = (*self._limits, cells, observe, self._step_reward)
 
     def _set_limits(self, x: float, theta: float) -> None:
@@ -376,11 +374,7 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int], CartPo
             RenderError: No picture can be made.
         """
         if self.render_mode is None:
-            logger.warn(
-                "You are calling render method without specifying any render mode. "
-                f'Specify it when you make the env: gymnasium.make("{ENV_ID}", '
-                'render_mode="rgb_array")'
-            )
+            warn_without_mode()
             return None
         if self.state is None:
             return None
@@ -396,11 +390,6 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int], CartPo
 
 def _is_known(name: str) -> bool:
     return hasattr(CartPoleEnv, name) or name in gymnasium.Env.__annotations__
-
-
-def _observe(simulation: Simulation) -> npt.NDArray[np.float32]:
-    """The observation, also of several poles."""
-    return simulation.state.astype(np.float32)
 
 
 def _needs_reset(control: float) -> State:

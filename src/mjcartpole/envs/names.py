@@ -104,8 +104,9 @@ def _gravity(cartpole: CartPole) -> float:
 def _edit_gravity(cartpole: CartPole, value: Any) -> dict[str, object]:  # noqa: ANN401 - any number
     if directions(cartpole).up[2] != 1:
         raise ConfigError(
-            "up is not +z in this model; set all of its gravity, "
-            'as edits={"option.gravity": "0 -9.8 0"}'
+            f"up is not +z in this model; set all of its gravity, which is "
+            f"{' '.join(f'{part:g}' for part in cartpole.model.opt.gravity)}, by "
+            'edits={"option.gravity": "X Y Z"}'
         )
     return {"gravity": float(value)}
 
@@ -259,6 +260,31 @@ class CartPoleNames:
             return shown
         return dataclasses.replace(shown, model=simulation.model)
 
+
+class FixedNames:
+    """CartPole-v1's names of many environments: read only, since edits are made at the start."""
+
+    cartpole: CartPole
+
+    def __getattr__(self, name: str) -> Any:  # noqa: ANN401 - any of several
+        number = vars(CartPoleNames).get(name)
+        if isinstance(number, Number):
+            return number.read(self.cartpole)
+        if name in _LIMITS:
+            return _LIMITS[name]
+        raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+
+    def __setattr__(self, name: str, value: object) -> None:
+        own = name == "state" or name.startswith("_") or hasattr(type(self), name)
+        if not own and difflib.get_close_matches(name, SETTABLE, n=1, cutoff=CLOSE):
+            raise SettingError(
+                f"{name} of many environments cannot be set; make them with "
+                'edits={"pole.length": 1.5} and the like, which all of them get'
+            )
+        super().__setattr__(name, value)
+
+
+_LIMITS: Final = {"x_threshold": task.X_LIMIT, "theta_threshold_radians": task.THETA_LIMIT}
 
 SETTABLE: Final = (
     *(each.name for each in vars(CartPoleNames).values() if isinstance(each, Number)),

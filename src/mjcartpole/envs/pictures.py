@@ -4,7 +4,9 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
+from gymnasium import logger
 
+from mjcartpole.envs.registration import ENV_ID
 from mjcartpole.errors import ConfigError
 from mjcartpole.media.renderer import DEFAULT_HEIGHT, DEFAULT_WIDTH, Renderer, open_renderer
 from mjcartpole.media.scene import DEFAULT_CAMERA, check_picture
@@ -58,6 +60,14 @@ class Pictures:
 
     def __getstate__(self) -> dict[str, Any]:
         return self.__dict__ | {"_renderer": None, "_window": None}
+
+
+def warn_without_mode() -> None:
+    """Say that there is nothing to render without a render mode, as gymnasium does."""
+    logger.warn(
+        "You are calling render method without specifying any render mode. "
+        f'Specify it when you make the env: gymnasium.make("{ENV_ID}", render_mode="rgb_array")'
+    )
 
 
 def _check_render_mode(render_mode: str | None, width: int, height: int) -> None:

@@ -11,6 +11,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from mjcartpole import task
+from mjcartpole.envs.names import FixedNames
 from mjcartpole.envs.registration import ENV_ID
 from mjcartpole.errors import ConfigError, InvalidActionError, ResetNeededError
 from mjcartpole.integrator import Integrator
@@ -28,7 +29,7 @@ _NOBODY: Final = np.empty(0, dtype=np.intp)
 
 
 class CartPoleVectorEnv(
-    VectorEnv[npt.NDArray[np.float32], npt.NDArray[np.integer[Any]], npt.NDArray[Any]]
+    FixedNames, VectorEnv[npt.NDArray[np.float32], npt.NDArray[np.integer[Any]], npt.NDArray[Any]]
 ):
     """Many copies of CartPole-v1, moved together by MuJoCo on all cores.
 

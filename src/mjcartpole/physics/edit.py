@@ -64,6 +64,9 @@ def edits_of(edits: Mapping[str, object] | Sequence[str]) -> dict[str, object]:
         ConfigError: A text is no edit, or two are of the same thing.
     """
     if isinstance(edits, Mapping):
+        for key in edits:
+            if not isinstance(key, str):
+                raise ConfigError(f"an edit is called by a text such as 'pole.length', not {key!r}")
         return dict(edits)
     found: dict[str, object] = {}
     texts = [edits] if isinstance(edits, str) or not isinstance(edits, Iterable) else edits

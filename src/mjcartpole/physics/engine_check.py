@@ -12,6 +12,7 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
+from mjcartpole.physics.bodies import farthest_from_origin
 from mjcartpole.physics.equations import Parameters, coefficients
 from mjcartpole.physics.free_region import FreeRegion
 from mjcartpole.physics.model import CartPole
@@ -25,6 +26,9 @@ _SPEED: Final = 5.0
 _ROUNDING: Final = 1e-9
 """Relative to the largest force of a state: more than rounding far from the world's origin makes,
 less than anything that a single step would show."""
+
+_POSITIONS: Final = 1e-5
+"""Of the weight; times `_ROUNDING`, some tens of roundings of a position."""
 
 _SUMS: Final = {"qfrc_applied", "qfrc_inverse", "qfrc_smooth"}
 """What the caller applies, and sums of other kinds."""
@@ -70,6 +74,7 @@ def _excesses(
     forces = {name: getattr(data, name)[joints] for name in _KINDS}
     forces["qfrc_constraint"] -= _dry_friction(data)[joints]
     scale = max(float(np.abs(values).max()) for values in (*forces.values(), *expected.values()))
+    scale = max(scale, _whole_weight(cartpole, p, state))
     for name, values in forces.items():
         excess = np.abs(values - expected.get(name, np.zeros(2)))
         # Where the equations have nothing, nothing is exactly nothing.
@@ -98,6 +103,13 @@ def _expected(
         "qfrc_passive": brake,
         "qfrc_actuator": np.array([acting - p.motor_damping * x_dot, 0.0]),
     }
+
+
+def _whole_weight(cartpole: CartPole, p: Parameters, state: Vector) -> float:
+    """What weight and rotation would be with the farthest arm that positions round by, N or N m."""
+    arm = farthest_from_origin(cartpole) + abs(state[0])
+    pull = p.gravity + arm * state[3] ** 2
+    return float((p.cart_mass + p.pole_mass) * pull * max(arm, 1.0) * _POSITIONS)
 
 
 def _dry_friction(data: mujoco.MjData) -> Vector:

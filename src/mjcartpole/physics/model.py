@@ -294,6 +294,10 @@ def find_model(source: str | os.PathLike[str]) -> Path:
     Raises:
         ModelNotFoundError: There is no such name or file.
     """
+    if not isinstance(source, str | os.PathLike):
+        raise ModelNotFoundError(
+            f"a model is a name, path, document, MjSpec or loaded cart-pole, not {source!r}"
+        )
     path = Path(source)
     if path.suffix == ".xml" or len(path.parts) > 1:
         if path.is_file():

@@ -97,6 +97,10 @@ class Simulation:
         for place, joint in self._places:
             self._qpos[joint], self._qvel[joint] = state[place], state[place + 1]
 
+    def observe(self) -> npt.NDArray[np.float32]:
+        """The state as an observation, shape (size,)."""
+        return self.state.astype(np.float32)
+
     def steps(
         self, states: npt.NDArray[np.float64], controls: npt.NDArray[np.float64]
     ) -> npt.NDArray[np.float64]:

@@ -1,5 +1,6 @@
 """Rungs 2 to 4: accelerations, and single steps with both integrators."""
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -16,6 +17,9 @@ from mjcartpole.physics.file_steps import file_step
 from mjcartpole.studies.parity.diagnosis import Predict, likely_cause
 from mjcartpole.studies.parity.result import Figure, Result
 from mjcartpole.studies.parity.subject import Against, Batch, Subject, Vector
+
+LEAST_ARM = 1e-9
+"""Metres."""
 
 EPS = float(np.finfo(np.float64).eps)
 
@@ -88,7 +92,10 @@ def acceleration_scale(
     """
     k = coefficients(p)
     x, x_dot, _, theta_dot = np.abs(states).T
-    arms = 1 + (x + offset) / abs(p.com_distance)
+    # Of a pole whose centre of mass is on its hinge, the mass still has an arm.
+    arms = 1 + (x + offset) / max(
+        abs(p.com_distance), math.sqrt(p.inertia / p.pole_mass), LEAST_ARM
+    )
     shared = np.hypot(k.coupling, k.crossing)
     push = np.abs(forces) + abs(k.pull) + k.slider_damping * x_dot + arms * shared * theta_dot**2
     swing = k.hinge_inertia * theta_dot**2 + shared * x_dot * theta_dot

@@ -10,7 +10,7 @@ from scipy import stats
 
 from mjcartpole.learning.episodes import ENDINGS, ending_index
 from mjcartpole.physics import equations, linear
-from mjcartpole.studies.parity.dynamics import EPS, STEP_BOUNDS, beyond_result, step_unit
+from mjcartpole.studies.parity.dynamics import EPS, LEAST_ARM, STEP_BOUNDS, beyond_result, step_unit
 from mjcartpole.studies.parity.result import Figure, Result
 from mjcartpole.studies.parity.subject import Batch, Subject, Vector
 
@@ -139,7 +139,8 @@ def _stabilising_gain(subject: Subject) -> Vector:
     """Signs of a push that keeps the pole up for a while: towards where it leans."""
     # The pole's slower mode decides: lean plus rate over its time constant.
     p = subject.reference
-    arm = p.inertia / (p.pole_mass * abs(p.com_distance)) + abs(p.com_distance)
+    distance = max(abs(p.com_distance), LEAST_ARM)
+    arm = p.inertia / (p.pole_mass * distance) + distance
     time = float(np.sqrt(arm / max(abs(p.gravity), 1e-6)))
     sign = math.copysign(1.0, linear.linearisation(p)[1][3, 0])
     return -sign * np.array([0.02, 0.05, 1.0, time])
