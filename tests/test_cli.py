@@ -29,6 +29,23 @@ def call(arguments, capsys):
     return stop.value.code, captured.out, captured.err
 
 
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["train", "--bins", "1,3,,6,8"], "nothing between two commas"),
+        (["model", "show", "-o", "x.xml"], "-o is for `model edit`"),
+        (["model", "list", "long"], "`model show` takes a name"),
+        (["model", "list", "--set", "pole.length=2"], "`model show` takes a name"),
+        (["model", "show", "/dev/zero"], "'/dev/zero' is a device or a pipe, not a file"),
+        (["transfer", "policy.json", "--models", "gym", "--set", "pole.length=2"], "no run folder"),
+    ],
+)
+def test_what_has_no_effect_is_refused(arguments, said, capsys):
+    code, out, err = call(arguments, capsys)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert said in err
+
+
 @pytest.fixture
 def here(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)

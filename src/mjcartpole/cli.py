@@ -139,13 +139,15 @@ def _parity(command: Parity) -> int:
 def _model(command: Model) -> int:
     from mjcartpole import model_command  # noqa: PLC0415
 
-    match command.action:
-        case "list":
-            return model_command.run_list()
-        case "show":
-            return model_command.run_show(command.name, command.set, command.own_timestep)
-        case "edit":
-            return model_command.run_edit(command.name, command.set, command.output)
+    if command.action == "edit":
+        return model_command.run_edit(command.name, command.set, command.output)
+    if command.output is not None:
+        raise UsageError(f"-o is for `model edit`: `model {command.action}` writes no file")
+    if command.action == "show":
+        return model_command.run_show(command.name, command.set, command.own_timestep)
+    if command.set or command.name != "cartpole":
+        raise UsageError("`model list` lists all models; `model show` takes a name and edits")
+    return model_command.run_list()
 
 
 def _examine(command: Doctor) -> int:
@@ -366,6 +368,10 @@ def _split_lists(argv: Sequence[str]) -> list[str]:
 def _split_values(word: str) -> list[str]:
     if os.path.exists(word):  # noqa: PTH110 - a Path raises where a name is too long
         return [word]
+    if word.startswith("[") and word.endswith("]"):
+        word = word[1:-1]
+    if re.search(r",\s*,", word):
+        raise UsageError(f"'{word}' has nothing between two commas; give values as 1,3,6,8")
     return [value for value in re.split(r"[,\s]+", word) if value]
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mjcartpole.envs.backend import Backend, check_backend
-from mjcartpole.errors import RunError
+from mjcartpole.errors import ConfigError, RunError
 from mjcartpole.files import is_file
 from mjcartpole.integrator import Integrator
 from mjcartpole.learning import runs
@@ -125,6 +125,8 @@ def set_stage(source: Path, choice: Choice) -> Stage:
         name = _run_name(source.parent) if source.name == runs.POLICY else source.stem
         policy = Policy.load(source)
         backend, integrator, model, own_timestep = "mujoco", "gym", "cartpole", False
+        if choice.allow_assets:
+            raise ConfigError("--allow-assets is for the model of a run; a policy's file has none")
     else:
         run = runs.load_run(source)
         name, policy = _run_name(run.folder), run.policy

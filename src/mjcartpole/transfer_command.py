@@ -85,6 +85,10 @@ def run_transfer(
     settings: dict[str, Any] = {"episodes": episodes, "seed": seed, "workers": workers}
     if swept is None:
         chosen = dict.fromkeys(models or _fitting(policies))
+        if set(chosen) == {GYM} and (edits or own_timestep):
+            raise ConfigError(
+                "gym is gymnasium's own cart-pole: --set and --own-timestep change nothing there"
+            )
         places = [find_place(model, edits, **physics) for model in chosen]
         target = _target(output, "transfer", overwrite)
         matrix = transfer(policies, places, **settings)

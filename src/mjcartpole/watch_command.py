@@ -20,7 +20,8 @@ from mjcartpole.learning.training import Training, TrainResult
 from mjcartpole.media.renderer import open_renderer
 from mjcartpole.media.video import write_video
 from mjcartpole.output import stdout_problem
-from mjcartpole.physics.model import CartPole, find_model, self_contained
+from mjcartpole.physics.model import CartPole, find_model
+from mjcartpole.physics.reading import read_whole
 from mjcartpole.physics.simulation import silence_mujoco
 from mjcartpole.signals import Interrupted, StopSignals
 from mjcartpole.studies.evaluation import Evaluation, evaluate
@@ -112,7 +113,7 @@ class Watched:
         mark = hashlib.sha256(text)
         if b"<include" in text:
             try:
-                whole = self_contained(text.decode("utf-8"), self.path.parent)
+                whole = read_whole(text.decode("utf-8"), str(self.path), self.path.parent).text
             except (UnicodeDecodeError, MjCartPoleError) as error:
                 whole = str(error)
             mark.update(whole.encode())

@@ -12,7 +12,8 @@ from PIL import Image
 from mjcartpole.errors import ModelError, ModelNotFoundError
 from mjcartpole.learning.run_model import check_storable, write_model
 from mjcartpole.physics.assets import is_stored
-from mjcartpole.physics.model import load_model, load_stored, same_model, self_contained
+from mjcartpole.physics.model import load_model, load_stored, same_model
+from mjcartpole.physics.reading import read_whole
 
 MESH = '<mesh name="m" file="{}"/>'
 TEXTURE = '<texture name="t" type="2d" file="{}"/>'
@@ -297,7 +298,7 @@ def test_only_names_of_files_are_written_anew(tmp_path):
     file = tmp_path.resolve() / "a" / "m.obj"
     assert load_model(path).xml == text.replace("'a'", "''").replace("m.obj", str(file))
     plain = document("<!-- a -- b --><compiler meshdir='a' assetdir='b'/>", "<!-- mesh -->")
-    assert self_contained(plain, tmp_path) == plain
+    assert read_whole(plain, "it", tmp_path).text == plain
 
 
 def test_absolute_names_need_no_folder(tmp_path):

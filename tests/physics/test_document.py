@@ -24,6 +24,12 @@ def the(document, tag):
     return found
 
 
+def test_attributes_by_the_thousand_are_refused_before_they_take_time():
+    many = " ".join(f'a{i}="1"' for i in range(100_000))
+    with pytest.raises(ModelSyntaxError, match="more than 1000 attributes"):
+        Document(f"<mujoco><worldbody {many}/></mujoco>")
+
+
 def test_elements_are_found_with_their_attributes():
     document = Document(TEXT)
     assert [each.tag for each in document.root.walk()] == [

@@ -20,9 +20,9 @@ from mjcartpole.physics.model import (
     model_names,
     models_folder,
     same_model,
-    self_contained,
     with_options,
 )
+from mjcartpole.physics.reading import read_whole
 
 REFERENCE = (models_folder() / "cartpole.xml").read_text(encoding="utf-8")
 
@@ -224,7 +224,7 @@ def test_includes_are_put_in_their_place(tmp_path):
     cartpole = load_model(path)
     assert "<include" not in cartpole.xml
     assert same_model(load_model(cartpole.xml).model, cartpole.model)
-    assert self_contained(REFERENCE, tmp_path) == REFERENCE
+    assert read_whole(REFERENCE, "it", tmp_path).text == REFERENCE
 
 
 def test_includes_inside_includes_are_sought_beside_the_main_file(tmp_path):
@@ -244,6 +244,14 @@ def test_comments_as_people_write_them_are_taken():
     heavy = load_model(text, {"cart.mass": 2})
     assert "<!---- a -- b ---->" in heavy.xml
     assert heavy.model.body("cart").mass[0] == 2
+
+
+@pytest.mark.parametrize("field", ["numslices", "numstacks", "numquads"])
+def test_pictures_of_too_many_facets_are_refused(field):
+    rough = f'<visual><quality {field}="{{}}"/></visual><asset>'
+    assert load_model(REFERENCE.replace("<asset>", rough.format(512), 1))
+    with pytest.raises(ModelError, match=f"513 {field}; no more than 512"):
+        load_model(REFERENCE.replace("<asset>", rough.format(513), 1))
 
 
 def test_integrators_are_numbered_as_in_mujoco():

@@ -15,7 +15,7 @@ REFERENCE = (models_folder() / "cartpole.xml").read_text(encoding="utf-8")
 SERVO = re.sub(
     "<motor .*/>", '<position joint="slider" kp="5000" ctrlrange="-1 1"/>', REFERENCE, count=1
 )
-THROWN = "use a smaller force, a shorter time step or a longer pole"
+THROWN = "one step changes too much: look at the force, the time step"
 FALLEN = "the pole falls to one side"
 CARRIED = "the cart leaves to one side"
 
@@ -58,7 +58,8 @@ def test_what_cannot_be_balanced(case, integrator):
     model, edits, advice = HOPELESS[case]
     line = why_unplayable(load_model(model, edits, own_timestep="long" in case), integrator)
     assert line is not None
-    assert line.startswith("no policy can balance this: from ")
+    assert re.match("(no|hardly any) policy can balance this: from ", line)
+    assert line.startswith("no") == ("from 8 of 8 " in line)
     assert advice in line
     assert "\n" not in line
 

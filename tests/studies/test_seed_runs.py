@@ -1,6 +1,7 @@
 """The folder of many seeds."""
 
 import json
+import shutil
 
 import pytest
 
@@ -72,6 +73,19 @@ def test_seeds_without_a_policy_are_told_apart(tmp_path):
     assert seed_runs.learned_seeds(folder) == ({3: folder / "seed-3"}, [2])
     (folder / "seed-3" / "policy.json").unlink()
     with pytest.raises(RunError, match="train --resume"):
+        seed_runs.learned_seeds(folder)
+
+
+def test_a_seed_that_is_another_run_is_refused(tmp_path):
+    folder = tmp_path / "many"
+    train_in(folder)
+    (folder / "seed-3").rename(tmp_path / "elsewhere")
+    (folder / "seed-3").symlink_to(tmp_path / "elsewhere")
+    with pytest.raises(RunError, match="is a link"):
+        seed_runs.learned_seeds(folder)
+    (folder / "seed-3").unlink()
+    shutil.copytree(folder / "seed-2", folder / "seed-3")
+    with pytest.raises(RunError, match="is the run of another seed"):
         seed_runs.learned_seeds(folder)
 
 

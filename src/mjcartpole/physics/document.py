@@ -14,6 +14,9 @@ from xml.sax.saxutils import escape
 
 from mjcartpole.errors import ModelSyntaxError
 
+MOST_ATTRIBUTES: Final = 1_000
+"""Of one element; MJCF knows some fifty."""
+
 MOST_ELEMENTS: Final = 5_000
 """Elements of a document."""
 
@@ -170,6 +173,9 @@ class Document:
         parser.StartElementHandler = start
         parser.EndElementHandler = end
         parser.EntityDeclHandler = entity
+        # expat's time goes with the square of their number.
+        if max(tag.count("=") for tag in text.split("<")) > MOST_ATTRIBUTES:
+            raise ModelSyntaxError(f"it has an element with more than {MOST_ATTRIBUTES} attributes")
         try:
             self._bytes = text.encode("utf-8")
             parser.Parse(made_strict(text), True)

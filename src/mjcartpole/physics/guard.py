@@ -132,7 +132,8 @@ def _judge(name: str, code: int, answer: str) -> None:
 def _too_much(name: str, reason: str) -> ModelError:
     return ModelError(
         f"{name} asks for too much: MuJoCo could not compile and step it with "
-        f"{MEMORY // 2**20} MB in {SECONDS} s ({reason}); look for large textures, height fields, "
+        f"{MEMORY // 2**20} MB, {SECONDS} s of processor time and {_PATIENCE:.0f} s in all "
+        f"({reason}); look for large textures, height fields, "
         "meshes, files and counts, for geoms that all touch and models that attach themselves"
     )
 

@@ -263,6 +263,9 @@ def load_stored(
     Raises:
         ModelError: It does not load, is no cart-pole, or names a file elsewhere.
     """
+    for allowed in allow_assets:
+        if not allowed.is_dir():
+            raise ConfigError(f"'{allowed}' is no folder; give one in which the model's files lie")
     inside = (folder, *allow_assets)
     return _find_parts(name, *_compile(document, name, folder, inside), own_timestep)
 
@@ -302,7 +305,8 @@ def find_model(source: str | os.PathLike[str]) -> Path:
     if path.suffix == ".xml" or len(path.parts) > 1:
         if path.is_file():
             return path
-        found = "is a folder" if path.is_dir() else "is not there"
+        other = "is a folder" if path.is_dir() else "is a device or a pipe, not a file"
+        found = other if path.exists() else "is not there"
         raise ModelNotFoundError(
             f"model file '{source}' {found}; give the path of an MJCF file, "
             f"or one of the names {', '.join(model_names())}"
@@ -364,18 +368,6 @@ def _values_of(part: object, prefix: str = "") -> Iterator[tuple[str, object]]:
             yield prefix + name, value
         else:
             yield from _values_of(value, f"{prefix}{name}.")
-
-
-def self_contained(text: str, folder: Path) -> str:
-    """The document with the content of its `<include>` files in their place.
-
-    Other files that it needs, such as meshes, it then names by absolute paths. A document without
-    any of these is returned as it is, to the last character.
-
-    Raises:
-        ModelError: The document or an included file cannot be read.
-    """
-    return read_whole(text, "the XML document", folder).text
 
 
 def _find_parts(name: str, xml: str, model: mujoco.MjModel, own_timestep: bool) -> CartPole:

@@ -285,7 +285,9 @@ def pole_of(cartpole: CartPole, pole: int = 0) -> _Pole:
             place = position + turn @ model.body_pos[body]
             frames[body] = place, turn @ _rotation(model.body_quat[body])
         position, turn = frames[body]
-        places.append(position + turn @ model.body_ipos[body])
+        # The engine takes a centre of mass nearer than 1e-6 m for in place.
+        in_place = model.body_sameframe[body] == mujoco.mjtSameFrame.mjSAMEFRAME_BODY
+        places.append(position if in_place else position + turn @ model.body_ipos[body])
         along = axis @ turn @ _rotation(model.body_iquat[body])
         moments.append(float(along * along @ model.body_inertia[body]))
     com = places[0].copy()

@@ -38,8 +38,10 @@ _SHIFT: Final = 1e-6
 """Of an acceleration, relative; a smaller change with the cart's place is the solver's."""
 
 _ADVICE: Final = {
-    "thrown": "use a smaller force, a shorter time step or a longer pole",
-    "fallen": "the pole falls to one side even against the full force; use a larger one",
+    "thrown": "one step changes too much: look at the force, the time step, the pole's length and "
+    "inertia, gravity and damping",
+    "fallen": "the pole falls to one side even against the full force: use a larger force, or less "
+    "friction, mass or gravity",
     "carried": "the cart leaves to one side even against the full force; use a larger one, or "
     "take out what pulls along the rail",
 }
@@ -67,9 +69,10 @@ def why_unplayable(cartpole: CartPole, integrator: Integrator = "gym") -> str | 
         return _too_coarse(search)
     (kind, _), *_ = Counter(kind for kind, _ in lost).most_common(1)
     steps = max(steps for _, steps in lost)
+    who = "no policy" if len(lost) == STARTS else "hardly any policy"
     when = f"within {steps} steps" if steps > 1 else "in its first step"
     return (
-        f"no policy can balance this: from {len(lost)} of {STARTS} starts every sequence of "
+        f"{who} can balance this: from {len(lost)} of {STARTS} starts every sequence of "
         f"actions ends the episode {when}; {_ADVICE[kind]}"
     )
 

@@ -27,6 +27,10 @@ MOST_ITERATIONS: Final = 10_000
 """Of a solver, per step."""
 
 
+MOST_FACETS: Final = 512
+"""Of a sphere or a plane, in each direction; 28 is MuJoCo's default."""
+
+
 class HasParts(HasJoints, Protocol):
     """A compiled model whose joints and controls have been found."""
 
@@ -62,6 +66,12 @@ def check_numbers(name: str, model: mujoco.MjModel) -> None:
             raise ModelError(
                 f"{name} asks for {getattr(model.opt, field)} {field} in each step; no more than "
                 f"{MOST_ITERATIONS} are done"
+            )
+    for field in ("numslices", "numstacks", "numquads"):
+        if getattr(model.vis.quality, field) > MOST_FACETS:
+            raise ModelError(
+                f"{name} has its pictures drawn with {getattr(model.vis.quality, field)} {field}; "
+                f"no more than {MOST_FACETS} are drawn: look at <visual><quality>"
             )
     if not model.opt.timestep > 0:
         raise ModelError(f"{name} has a timestep of {model.opt.timestep:g} s; use 0.02")

@@ -20,6 +20,7 @@ from mjcartpole.errors import RunError
 from mjcartpole.files import is_file, remove, write_whole
 from mjcartpole.learning import runs
 from mjcartpole.learning.config import TrainConfig
+from mjcartpole.learning.documents import read_config
 from mjcartpole.learning.folders import SEEDS, check_here, held_folder, locked_folder
 from mjcartpole.learning.run_model import MODEL, read_model, remove_assets, write_model
 from mjcartpole.learning.stored import Fields, read_document
@@ -63,6 +64,10 @@ def learned_seeds(folder: Path) -> tuple[dict[int, Path], list[int]]:
     """
     runs_of = {seed: seed_folder(folder, seed) for seed in _read_seeds(folder)[2]}
     learned = {seed: run for seed, run in runs_of.items() if runs.POLICY in runs.content_of(run)}
+    for seed, run in learned.items():
+        check_here(run)
+        if read_config(run)[2].seed != seed:
+            raise RunError(f"'{run}' is the run of another seed; put the one of seed {seed} there")
     if not learned:
         raise RunError(
             f"no seed in '{folder}' has a policy yet; go on with "

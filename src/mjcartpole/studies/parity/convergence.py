@@ -94,7 +94,7 @@ def _duration(subject: Subject) -> float:
     p, k = subject.reference, coefficients(subject.reference)
     _, falling = equations.accelerations(p, 0.0, 1.0, 0.0, 0.0)
     _, pushed = equations.accelerations(p, 0.0, START[2], START[3], p.forces[1])
-    fastest = max(abs(float(falling)), abs(float(pushed)), 1e-6)
+    fastest = max(abs(float(falling)), abs(float(pushed)), 1e-2)
     inertia = np.array([[k.slider_inertia, k.coupling], [k.coupling, k.hinge_inertia]])
     braking = np.linalg.solve(inertia, np.diag([k.slider_damping, k.hinge_damping]))
     # Beyond a time constant of the strongest brake, coarse steps overshoot instead of converging.

@@ -92,11 +92,10 @@ def acceleration_scale(
     """
     k = coefficients(p)
     x, x_dot, _, theta_dot = np.abs(states).T
-    # Of a pole whose centre of mass is on its hinge, the mass still has an arm.
-    arms = 1 + (x + offset) / max(
-        abs(p.com_distance), math.sqrt(p.inertia / p.pole_mass), LEAST_ARM
-    )
-    shared = np.hypot(k.coupling, k.crossing)
+    # Where the centre of mass is on the hinge, the mass still has an arm.
+    arm = max(abs(p.com_distance), math.sqrt(p.inertia / p.pole_mass), LEAST_ARM)
+    arms = 1 + (x + offset) / arm
+    shared = p.pole_mass * arm
     push = np.abs(forces) + abs(k.pull) + k.slider_damping * x_dot + arms * shared * theta_dot**2
     swing = k.hinge_inertia * theta_dot**2 + shared * x_dot * theta_dot
     weight = np.hypot(k.weight, k.leaning)
