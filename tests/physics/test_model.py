@@ -10,6 +10,7 @@ import pytest
 
 from mjcartpole.errors import (
     ConfigError,
+    ModelError,
     ModelNotFoundError,
     ModelSyntaxError,
     NotACartPoleError,
