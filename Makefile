@@ -18,10 +18,10 @@ train: $(VENV)/installed
 	@$(BIN)/mjcartpole train --backend mujoco $(ARGS)
 
 test: lint
-	$(BIN)/python -m pytest -q -m "not slow"
+	$(BIN)/python -m pytest -q -n auto -m "not slow"
 
 test-all: lint
-	$(BIN)/python -m pytest -q
+	$(BIN)/python -m pytest -q -n auto
 
 bench: $(VENV)/installed-dev
 	$(BIN)/python -m benchmarks.bench $(ARGS)
