@@ -1,6 +1,7 @@
 """Models are found, checked and understood, or refused with the reason."""
 
 import math
+import pickle
 import re
 from xml.etree import ElementTree
 
@@ -17,6 +18,7 @@ from mjcartpole.errors import (
 )
 from mjcartpole.physics.model import (
     INTEGRATORS,
+    is_its_document,
     load_model,
     model_names,
     models_folder,
@@ -310,3 +312,11 @@ def test_what_a_notebook_shows_is_short():
     assert repr(load_model("twopoles")) == "CartPole('twopoles', 2 poles, timestep 0.02 s)"
     edited = load_model("cartpole", {"pole.length": 1.5})
     assert repr(edited) == "CartPole('cartpole with pole.length=1.5', 1 pole, timestep 0.02 s)"
+
+
+def test_a_copy_by_pickle_is_the_same_model():
+    cartpole = load_model("cartpole")
+    copy = pickle.loads(pickle.dumps(cartpole))
+    assert copy.model is not cartpole.model
+    assert same_model(copy.model, cartpole.model)
+    assert is_its_document(copy)
