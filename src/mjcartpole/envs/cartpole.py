@@ -252,7 +252,8 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int], CartPo
         return copied
 
     def __setattr__(self, name: str, value: object) -> None:
-        if name[0] != "_" and type(self) is CartPoleEnv and not _is_known(name):
+        own = name[0] == "_" or type(self) is not CartPoleEnv or hasattr(CartPoleEnv, name)
+        if not own and name not in gymnasium.Env.__annotations__:
             refuse_slip(name)
         super().__setattr__(name, value)
 
@@ -386,10 +387,6 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int], CartPo
     def close(self) -> None:
         """Free the renderer and the window, if there are any."""
         self._pictures.close()
-
-
-def _is_known(name: str) -> bool:
-    return hasattr(CartPoleEnv, name) or name in gymnasium.Env.__annotations__
 
 
 def _needs_reset(control: float) -> State:

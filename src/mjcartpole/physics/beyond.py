@@ -15,7 +15,7 @@ from mjcartpole.physics.deviations import deviations
 from mjcartpole.physics.engine_check import unexplained_forces
 from mjcartpole.physics.equations import CARTPOLE_V1, Parameters
 from mjcartpole.physics.file_steps import file_step, method_of
-from mjcartpole.physics.free_region import free_region
+from mjcartpole.physics.free_region import WIDE_BOX, free_region
 from mjcartpole.physics.model import CartPole, with_options
 from mjcartpole.physics.parameters import (
     can_push,
@@ -37,8 +37,6 @@ _SEEN_AT_ONCE: Final = {"qfrc_gravcomp", "qfrc_fluid"}
 """Kinds that act in every state or in none."""
 
 _STEPS: Final = 64
-_BOX: Final = (4.8, 10.0, np.pi, 10.0)
-"""Sampled states are within ± this: m, m/s, rad, rad/s."""
 
 _SAME_STEP: Final = 1e-9
 """Of the values of a step, relative: more than rounding, less than another integrator's."""
@@ -99,7 +97,7 @@ def beyond_step(cartpole: CartPole, method: str = "Euler") -> list[str]:
 
 def _steps_as(cartpole: CartPole, method: str) -> bool:
     p, rng, region = read_parameters(cartpole), np.random.default_rng(0), free_region(cartpole)
-    low, high = region.box(_BOX)
+    low, high = region.box(WIDE_BOX)
     states = rng.uniform(low, high, (_STEPS, 4))
     states = states[region.holds_for_a_step(states, p)]
     actions = rng.integers(2, size=len(states))

@@ -78,8 +78,7 @@ def _gravitys_direction(
     angles = {"rail_tilt", "hinge_tilt", "lean"}
     turned = {name for name in angles if getattr(own, name) != getattr(reference, name)}
     if turned and not any(getattr(square, name) for name in angles):
-        vector = " ".join(f"{part:g}" for part in cartpole.model.opt.gravity)
-        phrase = f"gravity {vector} instead of {reference.gravity:g} straight down"
+        phrase = f"gravity {_gravity(cartpole)} instead of {reference.gravity:g} straight down"
         yield Deviation(phrase, frozenset({"gravity", *turned}))
 
 
@@ -102,8 +101,11 @@ def _axes(cartpole: CartPole, own: Parameters, reference: Parameters) -> Iterato
 
 
 def _upside_down(cartpole: CartPole) -> str:
-    gravity = " ".join(f"{part:g}" for part in cartpole.model.opt.gravity)
-    return "" if directions(cartpole).up[2] > 0 else f" (gravity is {gravity})"
+    return "" if directions(cartpole).up[2] > 0 else f" (gravity is {_gravity(cartpole)})"
+
+
+def _gravity(cartpole: CartPole) -> str:
+    return " ".join(f"{part:g}" for part in cartpole.model.opt.gravity)
 
 
 def _degrees(angle: float) -> str:

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from mjcartpole.physics.bodies import farthest_from_origin
 from mjcartpole.physics.equations import Parameters, coefficients
-from mjcartpole.physics.free_region import FreeRegion
+from mjcartpole.physics.free_region import WIDE_BOX, FreeRegion
 from mjcartpole.physics.model import CartPole
 from mjcartpole.physics.parameters import joint_label, label
 from mjcartpole.physics.structure import push
@@ -48,21 +48,27 @@ def unexplained_forces(cartpole: CartPole, p: Parameters, region: FreeRegion) ->
         A phrase for each kind: the name of MuJoCo's array, and where and how much.
     """
     rng = np.random.default_rng(0)
-    box = region.within((-4.8, 4.8), (-np.pi, np.pi))
+    low, high = region.box(WIDE_BOX)
+    offset = farthest_from_origin(cartpole)
     found: dict[str, tuple[float, str]] = {}
     data = mujoco.MjData(cartpole.model)
     for _ in range(_SAMPLES):
-        x, theta = rng.uniform(*box.x), rng.uniform(*box.theta)
+        x, theta = rng.uniform(low[0], high[0]), rng.uniform(low[2], high[2])
         state = np.array([x, rng.normal() * _SPEED, theta, rng.normal() * _SPEED])
         for control in (*cartpole.controls, 0.0):
-            for kind, excess, joint in _excesses(cartpole, p, data, state, control):
+            for kind, excess, joint in _excesses(cartpole, p, data, state, control, offset):
                 if excess > found.get(kind, (0.0, ""))[0]:
                     found[kind] = excess, _phrase(cartpole, data, kind, excess, joint)
     return {kind: phrase for kind, (_, phrase) in found.items()}
 
 
 def _excesses(
-    cartpole: CartPole, p: Parameters, data: mujoco.MjData, state: Vector, control: float
+    cartpole: CartPole,
+    p: Parameters,
+    data: mujoco.MjData,
+    state: Vector,
+    control: float,
+    offset: float,
 ) -> Iterator[tuple[str, float, int]]:
     """Of each kind: the largest force beyond the equations' own, and on which joint."""
     joints = list(cartpole.joints)
@@ -74,7 +80,7 @@ def _excesses(
     forces = {name: getattr(data, name)[joints] for name in _KINDS}
     forces["qfrc_constraint"] -= _dry_friction(data)[joints]
     scale = max(float(np.abs(values).max()) for values in (*forces.values(), *expected.values()))
-    scale = max(scale, _whole_weight(cartpole, p, state))
+    scale = max(scale, _whole_weight(p, state, offset))
     for name, values in forces.items():
         excess = np.abs(values - expected.get(name, np.zeros(2)))
         # Where the equations have nothing, nothing is exactly nothing.
@@ -105,9 +111,9 @@ def _expected(
     }
 
 
-def _whole_weight(cartpole: CartPole, p: Parameters, state: Vector) -> float:
+def _whole_weight(p: Parameters, state: Vector, offset: float) -> float:
     """What weight and rotation would be with the farthest arm that positions round by, N or N m."""
-    arm = farthest_from_origin(cartpole) + abs(state[0])
+    arm = offset + abs(state[0])
     pull = p.gravity + arm * state[3] ** 2
     return float((p.cart_mass + p.pole_mass) * pull * max(arm, 1.0) * _POSITIONS)
 

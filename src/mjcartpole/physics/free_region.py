@@ -28,6 +28,9 @@ TASK: Final[tuple[Interval, Interval]] = (
 )
 """Where the rules let the cart (m) and the pole (rad) be."""
 
+WIDE_BOX: Final = (2 * task.X_LIMIT, 10.0, math.pi, 10.0)
+"""States are sampled within ± this, far beyond an episode: m, m/s, rad, rad/s."""
+
 _GRID: Final = (97, 33)
 """Places along the rail and angles at which contacts are looked for."""
 

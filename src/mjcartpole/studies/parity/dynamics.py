@@ -8,12 +8,12 @@ import gymnasium
 import numpy as np
 import numpy.typing as npt
 
-from mjcartpole import task
 from mjcartpole.integrator import Integrator
 from mjcartpole.physics import equations
 from mjcartpole.physics.dry_friction import DryFriction
 from mjcartpole.physics.equations import Parameters, coefficients
 from mjcartpole.physics.file_steps import file_step
+from mjcartpole.physics.free_region import WIDE_BOX
 from mjcartpole.studies.parity.diagnosis import Predict, likely_cause
 from mjcartpole.studies.parity.result import Figure, Result
 from mjcartpole.studies.parity.subject import Against, Batch, Subject, Vector
@@ -22,9 +22,6 @@ LEAST_ARM = 1e-9
 """Metres."""
 
 EPS = float(np.finfo(np.float64).eps)
-
-WIDE_BOX = (2 * task.X_LIMIT, 10.0, np.pi, 10.0)
-"""Far beyond an episode: m, m/s, rad, rad/s."""
 
 FAR = 2.0
 """Metres from the world's origin that are worth a word."""

@@ -76,19 +76,23 @@ class Subject:
         return CARTPOLE_V1 if self.against == "cartpole-v1" else self.own
 
     @cached_property
+    def _free(self) -> FreeRegion:
+        return free_region(self.cartpole)
+
+    @cached_property
     def region(self) -> FreeRegion:
         """Where states are drawn and compared.
 
         A model that is asked about itself is tested where it moves freely. Of one that shall be
         CartPole-v1, only that is left out which no episode meets.
         """
-        region = free_region(self.cartpole)
+        region = self._free
         return region if region.covers_task or self.against == "itself" else FreeRegion()
 
     @cached_property
     def beyond(self) -> list[str]:
         """What the model has that the equations do not cover."""
-        met = [] if self.region.bounds else free_region(self.cartpole).bounds
+        met = [] if self.region.bounds else self._free.bounds
         return list(dict.fromkeys([*met, *beyond_equations(self.cartpole)]))
 
     @property
