@@ -31,7 +31,7 @@ from mjcartpole.learning import runs
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.training import Training, train
 from mjcartpole.physics.batch_simulation import available_cores
-from mjcartpole.physics.model import load_model
+from mjcartpole.physics.load import load_model
 from mjcartpole.studies.many import train_many
 
 Section = Callable[[bool], Iterator[Ratio]]

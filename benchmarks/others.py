@@ -8,7 +8,7 @@ import numpy as np
 from gymnasium.envs.mujoco import MujocoEnv
 
 from mjcartpole import task
-from mjcartpole.physics.model import find_model, load_model
+from mjcartpole.physics.load import find_model, load_model
 
 
 class GymnasiumMujoco(MujocoEnv):

@@ -15,7 +15,7 @@ import numpy as np
 
 from mjcartpole.files import make_folder
 from mjcartpole.physics import linear
-from mjcartpole.physics.model import load_model
+from mjcartpole.physics.load import load_model
 from mjcartpole.studies.parity import Subject
 from mjcartpole.studies.parity.convergence import METHODS, energy_track
 from mjcartpole.studies.parity.dynamics import EPS

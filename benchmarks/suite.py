@@ -8,7 +8,7 @@ import numpy as np
 # It says why, and does so before the first model is opened.
 import mjcartpole.envs.dm  # noqa: F401
 from mjcartpole import task
-from mjcartpole.physics.model import load_model
+from mjcartpole.physics.load import load_model
 
 with warnings.catch_warnings():
     # dm_control opens a window library, which complains where there is no screen.

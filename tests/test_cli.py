@@ -16,7 +16,7 @@ from mjcartpole.errors import ConfigError
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.policy import Policy
 from mjcartpole.learning.training import train
-from mjcartpole.physics.model import load_model
+from mjcartpole.physics.load import load_model
 
 QUICK = ["--episodes", "30", "--no-video"]
 

@@ -16,8 +16,8 @@ from mjcartpole.learning.checkpoints import LATEST, PREVIOUS
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.session import Session
 from mjcartpole.learning.training import Training
-from mjcartpole.physics.model import load_model
-from mjcartpole.studies.conduct import conclude
+from mjcartpole.physics.load import load_model
+from mjcartpole.studies.finish_training import finish_training
 
 LIMIT = 20.0
 """Seconds that nothing may take."""
@@ -35,7 +35,7 @@ def interrupted(folder, config):
         session.save()
         if finished == 3:
             break
-    conclude(session, folder, cartpole, preset="tuned")
+    finish_training(session, folder, cartpole, preset="tuned")
 
 
 def call(arguments, capsys):

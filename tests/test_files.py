@@ -10,6 +10,7 @@ import pytest
 
 from mjcartpole.errors import FileError, RunError
 from mjcartpole.files import (
+    atomic_write,
     check_free,
     check_writable,
     free_path,
@@ -17,7 +18,6 @@ from mjcartpole.files import (
     make_folder,
     read_bytes,
     remove_leftovers,
-    replacing,
     write_whole,
 )
 
@@ -35,7 +35,7 @@ def test_a_failing_body_leaves_the_old_file(tmp_path):
     path.write_text("old")
 
     def fail():
-        with replacing(path) as temporary:
+        with atomic_write(path) as temporary:
             temporary.write_text("half")
             raise KeyboardInterrupt
 
@@ -46,7 +46,7 @@ def test_a_failing_body_leaves_the_old_file(tmp_path):
 
 
 def test_the_temporary_name_keeps_the_suffix(tmp_path):
-    with replacing(tmp_path / "video.mp4") as temporary:
+    with atomic_write(tmp_path / "video.mp4") as temporary:
         assert temporary.suffix == ".mp4"
         assert temporary.parent == tmp_path
 
@@ -76,7 +76,7 @@ def test_a_full_disk_leaves_the_old_file(tmp_path):
     path.write_text("old")
 
     def fill():
-        with replacing(path), open("/dev/full", "w") as full:
+        with atomic_write(path), open("/dev/full", "w") as full:
             full.write("x" * 10)
             full.flush()
 
@@ -118,7 +118,7 @@ def test_what_a_killed_writer_leaves_is_known_and_removed(name, tmp_path):
     for other in (name, ".hidden", ".lock", ".file-12345678", "file-12345678.txt"):
         (tmp_path / other).write_text("kept")
     (tmp_path / ".file-12345678").unlink()
-    with replacing(tmp_path / name) as temporary:
+    with atomic_write(tmp_path / name) as temporary:
         assert is_temporary(temporary.name)
         copy = temporary.read_bytes()
     temporary.write_bytes(copy)  # As a kill would have left it.

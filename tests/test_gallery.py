@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from mjcartpole.learning.config import TrainConfig
-from mjcartpole.physics.beyond import differs_from
-from mjcartpole.physics.edit import describe_edits, edit_document
-from mjcartpole.physics.model import load_model, model_names, models_folder, same_model
+from mjcartpole.physics.edit.edits import describe_edits, edit_document
+from mjcartpole.physics.load import load_model, model_names, models_folder, same_model
 from mjcartpole.physics.simulation import Simulation
+from mjcartpole.physics.unmodelled_effects import differs_from
 from mjcartpole.studies.evaluation import evaluate
 from mjcartpole.studies.parity import Subject, run_ladder
 

@@ -9,7 +9,7 @@ import textwrap
 import pytest
 
 from mjcartpole import leftovers
-from mjcartpole.files import check_writable, is_temporary, replacing, write_whole
+from mjcartpole.files import atomic_write, check_writable, is_temporary, write_whole
 from mjcartpole.media.pictures import replacing_folder
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="nothing is cleared there")
@@ -81,7 +81,7 @@ def test_what_is_somebody_elses_stays(tmp_path):
 
 def test_a_temporary_name_is_short_and_known_whatever_the_target_is_called(tmp_path):
     for name in ("n" * 251 + ".txt", "con:cat|é x.txt", "-o.txt"):
-        with replacing(tmp_path / name) as temporary:
+        with atomic_write(tmp_path / name) as temporary:
             assert is_temporary(temporary.name)
             assert temporary.suffix == ".txt"
         assert (tmp_path / name).exists()

@@ -9,7 +9,7 @@ import sys
 import pytest
 
 from mjcartpole import output
-from mjcartpole.physics.model import load_model
+from mjcartpole.physics.load import load_model
 
 TRAIN = "train --episodes 20 --no-video --run-dir run"
 FULL = "error: stdout could not be written (No space left on device)"

@@ -20,10 +20,10 @@ from mjcartpole.errors import ConfigError, SimulationError
 from mjcartpole.learning import runs
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.training import Training, train
-from mjcartpole.physics.model import load_model
+from mjcartpole.physics.load import load_model
 from mjcartpole.physics.simulation import Simulation
 from mjcartpole.studies.evaluation import evaluate
-from mjcartpole.studies.film import Film, Look, Stage, play
+from mjcartpole.studies.film import Film, PolicySetup, VideoOptions, play
 from mjcartpole.studies.transfer import transfer
 
 CHAIN = str(Path(__file__).parent / "models" / "chain.xml")
@@ -268,7 +268,7 @@ def test_a_policy_is_refused_where_there_are_other_poles(tmp_path):
     for play_it in (
         lambda: evaluate(two),
         lambda: evaluate(two, engine="python"),
-        lambda: play(Stage("two", two)),
+        lambda: play(PolicySetup("two", two)),
         lambda: transfer({"two": two}, ["cartpole"]),
     ):
         with pytest.raises(ConfigError, match=said):
@@ -337,9 +337,9 @@ def test_mistakes_are_one_line(words, said, tmp_path, monkeypatch, capsys):
 @both
 def test_a_film_shows_both_poles_and_their_numbers(model):
     policy = train(TrainConfig(model=model, episodes=5)).policy
-    take = play(Stage("it", policy, model=model))[0]
+    take = play(PolicySetup("it", policy, model=model))[0]
     assert take.states.shape == (take.episode.steps + 1, 6)
-    look = Look(width=320, height=240, overlay=True, quality="draft")
+    look = VideoOptions(width=320, height=240, overlay=True, quality="draft")
     with Film([[take]], look) as film:
         frames = [frame.copy() for frame in film.frames()]
     assert len(frames) == len(take.states)

@@ -54,7 +54,7 @@ def test_the_env_is_made_from_the_wheel(elsewhere):
     out = elsewhere(
         "-c",
         "import gymnasium, mjcartpole\n"
-        "from mjcartpole.physics.model import models_folder\n"
+        "from mjcartpole.physics.load import models_folder\n"
         "print(mjcartpole.__file__, models_folder())\n"
         "env = gymnasium.make('mjcartpole/CartPole-v1')\n"
         "env.reset(seed=0); print(env.step(1)[1])",

@@ -22,11 +22,11 @@ if TYPE_CHECKING:
     from mjcartpole.learning.config import TrainConfig
     from mjcartpole.learning.policy import Policy
     from mjcartpole.learning.training import TrainResult, train
-    from mjcartpole.physics.model import CartPole, load_model, model_names
+    from mjcartpole.physics.load import CartPole, load_model, model_names
     from mjcartpole.physics.simulation import Simulation
     from mjcartpole.studies.evaluation import Evaluation, evaluate
     from mjcartpole.studies.many import train_many
-    from mjcartpole.studies.seeds import ManyResult
+    from mjcartpole.studies.multi_seed import ManyResult
 
 __version__ = "0.1.0"
 

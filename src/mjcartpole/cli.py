@@ -105,7 +105,7 @@ def _import_mujoco() -> None:
     """
     signals = StopSignals()
     with signals.caught(), signals.deferred():
-        from mjcartpole import commands  # noqa: F401, PLC0415
+        from mjcartpole.commands import evaluate as commands  # noqa: F401, PLC0415
     if signals.stop():
         raise Interrupted(number=signals.number)
 
@@ -114,16 +114,16 @@ def _import_mujoco() -> None:
 
 
 def _evaluate(command: Evaluate) -> int:
-    from mjcartpole import commands  # noqa: PLC0415
+    from mjcartpole.commands import evaluate as commands  # noqa: PLC0415
 
-    choice = commands.Choice(**_choice(command))
+    choice = commands.EvalTarget(**_choice(command))
     return commands.run_evaluate(
         command.source, choice, episodes=command.episodes, as_json=command.json
     )
 
 
 def _parity(command: Parity) -> int:
-    from mjcartpole import parity_command  # noqa: PLC0415
+    from mjcartpole.commands import parity as parity_command  # noqa: PLC0415
 
     return parity_command.run_parity(
         command.model,
@@ -137,7 +137,7 @@ def _parity(command: Parity) -> int:
 
 
 def _model(command: Model) -> int:
-    from mjcartpole import model_command  # noqa: PLC0415
+    from mjcartpole.commands import model as model_command  # noqa: PLC0415
 
     if command.action == "edit":
         return model_command.run_edit(command.name, command.set, command.output)
@@ -159,7 +159,7 @@ def _examine(command: Doctor) -> int:
 
 
 def _transfer(command: Transfer) -> int:
-    from mjcartpole import transfer_command  # noqa: PLC0415
+    from mjcartpole.commands import transfer as transfer_command  # noqa: PLC0415
 
     return transfer_command.run_transfer(
         command.sources,
@@ -178,7 +178,7 @@ def _transfer(command: Transfer) -> int:
 
 
 def _watch(command: Watch) -> int:
-    from mjcartpole import watch_command  # noqa: PLC0415
+    from mjcartpole.commands import watch as watch_command  # noqa: PLC0415
 
     return watch_command.run_watch(
         command.file,
@@ -193,9 +193,9 @@ def _watch(command: Watch) -> int:
 
 
 def _train(command: Train) -> int:
-    from mjcartpole import train_command  # noqa: PLC0415
+    from mjcartpole.commands import train as train_command  # noqa: PLC0415
 
-    how = train_command.How(
+    how = train_command.TrainOptions(
         engine=command.engine,
         checkpoint_every=command.checkpoint_every,
         workers=command.workers,
@@ -208,7 +208,7 @@ def _train(command: Train) -> int:
     if command.resume is not None:
         _check_only_resumed(command)
         return train_command.run_resume(command.resume, how)
-    where = train_command.Where(command.preset, command.run_dir, command.overwrite)
+    where = train_command.RunLocation(command.preset, command.run_dir, command.overwrite)
     if command.seeds != 1:
         return train_command.run_seeds(command.config, how, where, seeds=command.seeds)
     if command.workers is not None:
@@ -217,13 +217,14 @@ def _train(command: Train) -> int:
 
 
 def _render(command: Render) -> int:
-    from mjcartpole import commands, render_command  # noqa: PLC0415
-    from mjcartpole.studies.film import Look  # noqa: PLC0415
+    from mjcartpole.commands import evaluate as commands  # noqa: PLC0415
+    from mjcartpole.commands import render as render_command  # noqa: PLC0415
+    from mjcartpole.studies.film import VideoOptions  # noqa: PLC0415
 
     if not command.sources:
         raise UsageError("render needs a RUN-OR-POLICY, or several; see mjcartpole render --help")
     width, height = _parse_size(command.size)
-    look = Look(
+    look = VideoOptions(
         width=width,
         height=height,
         camera=command.camera,
@@ -235,7 +236,7 @@ def _render(command: Render) -> int:
     )
     return render_command.run_render(
         command.sources,
-        commands.Choice(**_choice(command)),
+        commands.EvalTarget(**_choice(command)),
         look,
         episodes=command.episodes,
         output=command.output,

@@ -24,7 +24,7 @@ _LONGEST: Final = 300
 
 
 @contextlib.contextmanager
-def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
+def atomic_write(path: str | os.PathLike[str]) -> Iterator[Path]:
     """Yield a temporary path beside `path`; on success it takes the place of `path` at once.
 
     If the body raises, or the process is killed, the old file (if any) stays as it was.
@@ -48,7 +48,7 @@ def write_whole(path: str | os.PathLike[str], text: str) -> None:
     Raises:
         FileError: The folder cannot be written, or the disk is full.
     """
-    with replacing(path) as temporary:
+    with atomic_write(path) as temporary:
         # A file name in it that is no text is escaped, as JSON does it.
         temporary.write_bytes(text.encode("utf-8", "backslashreplace"))
 

@@ -1,12 +1,14 @@
-"""CartPole-v1's rules as numbers and pure functions.
+"""Tasks: the rules of the game, as numbers and pure functions.
 
-Only the rules: no physics engine, no gymnasium. The numbers are those of gymnasium's
-`CartPole-v1` (Barto, Sutton and Anderson, 1983, doi:10.1109/TSMC.1983.6313077).
+Only the rules: no physics engine, no gymnasium. A `Task` holds all of them; `CARTPOLE_V1` has the
+numbers of gymnasium's `CartPole-v1` (Barto, Sutton and Anderson, 1983,
+doi:10.1109/TSMC.1983.6313077).
 """
 
 import math
-from collections.abc import Mapping, Sequence
-from typing import Any, Final, SupportsFloat
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final, SupportsFloat, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +17,81 @@ from mjcartpole.errors import ConfigError
 
 CONTROL_STEP: Final = 0.02
 """Seconds between two actions."""
+
+Reward: TypeAlias = Callable[[float, float, float, float, bool], float]
+"""From the state after a step (x, x_dot, theta, theta_dot; m, m/s, rad, rad/s) and whether it ends
+the episode by the rules. Of several poles, theta and theta_dot are those of largest size. A plain
+function of numbers: the compiled engine compiles it as it is."""
+
+
+def one_per_step(x: float, x_dot: float, theta: float, theta_dot: float, terminated: bool) -> float:
+    """Return 1: CartPole-v1's reward, also of the step that ends the episode."""
+    return 1.0
+
+
+@dataclass(frozen=True)
+class Task:
+    """The rules of one game.
+
+    >>> TASKS["CartPole-v1"].has_ended(2.5, 0.0)
+    True
+
+    Attributes:
+        name: What it is called; `mjcartpole/<name>` is its id in gymnasium.
+        x_limit: The cart's centre may be this far from the middle of the track, in metres;
+            `math.inf` for a track that ends no episode.
+        theta_limit: The pole may lean this far, in radians; `math.inf` for any angle.
+        start_low: Lower bound of each of the starting state's values, drawn uniformly.
+        start_high: Upper bound.
+        reward: Reward of one control step.
+        time_limit: Control steps until an episode is truncated.
+        reward_threshold: Mean return at which it counts as solved; None where nothing is agreed.
+    """
+
+    name: str
+    x_limit: float = 2.4
+    theta_limit: float = 12 * 2 * math.pi / 360
+    start_low: float = -0.05
+    start_high: float = 0.05
+    reward: Reward = one_per_step
+    time_limit: int = 500
+    reward_threshold: float | None = None
+
+    def has_ended(self, x: float, theta: float) -> bool:
+        """Return whether the cart (m) has left the track or the pole (rad) has fallen.
+
+        The comparison is strict: a state exactly on a limit is still in play. Of several poles it
+        is the one that leans most.
+        """
+        return abs(x) > self.x_limit or abs(theta) > self.theta_limit
+
+
+CARTPOLE_V1: Final = Task("CartPole-v1", reward_threshold=475.0)
+"""Gymnasium's rules, with gymnasium's own expression for 12 degrees."""
+
+TASKS: Final[dict[str, Task]] = {}
+"""Every task by its name."""
+
+
+def register(task: Task) -> Task:
+    """Make a task known by its name, for `TrainConfig`, the command line and gymnasium."""
+    TASKS[task.name] = task
+    return task
+
+
+register(CARTPOLE_V1)
+
+
+def task_named(name: str) -> Task:
+    """Return the task of a name.
+
+    Raises:
+        ConfigError: There is none.
+    """
+    if name not in TASKS:
+        raise ConfigError(f"task {name!r} is unknown; available: {', '.join(TASKS)}")
+    return TASKS[name]
+
 
 X_LIMIT: Final = 2.4
 """The cart's centre may be this far from the middle of the track, in metres."""
@@ -118,7 +195,7 @@ def has_terminated(x: float, theta: float) -> bool:
     return x < -X_LIMIT or x > X_LIMIT or theta < -THETA_LIMIT or theta > THETA_LIMIT
 
 
-def farthest(values: Sequence[float] | npt.NDArray[np.float64]) -> float:
+def max_abs(values: Sequence[float] | npt.NDArray[np.float64]) -> float:
     """The largest size among values; NaN if one of them is NaN or infinite."""
     # Comparing would lose a NaN; adding does not.
     largest, total = 0.0, 0.0

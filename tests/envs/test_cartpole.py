@@ -25,7 +25,7 @@ from mjcartpole.errors import (
     ResetNeededError,
     SimulationError,
 )
-from mjcartpole.physics.model import load_model
+from mjcartpole.physics.load import load_model
 from mjcartpole.physics.simulation import Simulation
 
 ENV_ID = "mjcartpole/CartPole-v1"

@@ -13,7 +13,7 @@ import pytest
 
 import mjcartpole
 from mjcartpole.errors import ConfigError, ModelNotFoundError
-from mjcartpole.physics.model import load_model
+from mjcartpole.physics.load import load_model
 
 dm = pytest.importorskip("mjcartpole.envs.dm", exc_type=ImportError)
 # They come along with dm_control.

@@ -4,7 +4,7 @@ import pytest
 
 from mjcartpole.envs.editable import KINEMATICS, Editable
 from mjcartpole.errors import ConfigError
-from mjcartpole.physics.model import load_model
+from mjcartpole.physics.load import load_model
 
 
 def test_a_simulation_has_a_model_of_its_own():

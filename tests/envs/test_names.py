@@ -9,7 +9,7 @@ import pytest
 
 from mjcartpole.envs.cartpole import CartPoleEnv
 from mjcartpole.errors import ConfigError, SettingError
-from mjcartpole.physics.model import load_model
+from mjcartpole.physics.load import load_model
 
 ENV_ID = "mjcartpole/CartPole-v1"
 NAMES = [

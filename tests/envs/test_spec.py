@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from gymnasium.envs.registration import EnvSpec
 
-from mjcartpole.physics.model import load_model, models_folder
+from mjcartpole.physics.load import load_model, models_folder
 
 ENV_ID = "mjcartpole/CartPole-v1"
 LONG = models_folder() / "long.xml"

@@ -31,7 +31,7 @@ from mjcartpole.errors import (
     SettingError,
     SimulationError,
 )
-from mjcartpole.physics.model import load_model
+from mjcartpole.physics.load import load_model
 
 ENV_ID = "mjcartpole/CartPole-v1"
 REFERENCE = load_model("cartpole").xml

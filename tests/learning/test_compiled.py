@@ -26,7 +26,7 @@ from mjcartpole.learning.config import PRESETS, TrainConfig
 from mjcartpole.learning.discretizer import Discretizer
 from mjcartpole.learning.policy import Policy
 from mjcartpole.learning.training import Training, train
-from mjcartpole.physics.model import load_model
+from mjcartpole.physics.load import load_model
 from mjcartpole.studies.evaluation import evaluate
 
 REFERENCE = load_model().xml

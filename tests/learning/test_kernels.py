@@ -103,8 +103,8 @@ def test_an_episode_teaches_the_same(table, alpha, gamma, lam, visited, over):
 @given(rates, rates, st.floats(0, 2000), st.integers(0, 3000))
 @quick
 def test_schedules_are_the_same_line(start, end, length, number):
-    expected = schedules.on_line(start, end, length, number)
-    assert bits(kernels._on_line(start, end, length, number)) == bits(expected)
+    expected = schedules.linear(start, end, length, number)
+    assert bits(kernels._linear(start, end, length, number)) == bits(expected)
 
 
 def key_of(entry):

@@ -13,7 +13,7 @@ from mjcartpole.learning.checkpoints import LATEST, PREVIOUS
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.session import Session
 from mjcartpole.learning.training import Training, train
-from mjcartpole.physics.model import load_model, same_model
+from mjcartpole.physics.load import load_model, same_model
 
 SUMMARY = {
     "preset": "article",

@@ -2,7 +2,7 @@
 
 import pytest
 
-from mjcartpole.learning.schedules import LinearSchedule, on_line
+from mjcartpole.learning.schedules import LinearSchedule, linear
 
 
 @pytest.mark.parametrize(
@@ -24,7 +24,7 @@ def test_the_ends_are_exact():
 @pytest.mark.parametrize("episode", [0, 1, 33, 99, 100, 101])
 @pytest.mark.parametrize("length", [0, 0.5, 100, 99.9])
 def test_a_schedule_is_its_line(episode, length):
-    assert LinearSchedule(1.0, 0.1, length)(episode) == on_line(1.0, 0.1, length, episode)
+    assert LinearSchedule(1.0, 0.1, length)(episode) == linear(1.0, 0.1, length, episode)
 
 
 def test_a_slope_of_part_of_an_episode_has_its_start():

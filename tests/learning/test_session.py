@@ -9,7 +9,7 @@ from mjcartpole.learning.checkpoints import LATEST, PREVIOUS, load_checkpoint
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.session import Session, check_interval
 from mjcartpole.learning.training import Training, train
-from mjcartpole.physics.model import load_model
+from mjcartpole.physics.load import load_model
 
 CONFIG = TrainConfig(backend="gym", episodes=12, seed=5)
 CARTPOLE = load_model()

@@ -18,7 +18,7 @@ from mjcartpole import task
 from mjcartpole.errors import SimulationError
 from mjcartpole.learning import compiled, stepping
 from mjcartpole.physics.library import libmujoco
-from mjcartpole.physics.model import load_model
+from mjcartpole.physics.load import load_model
 from mjcartpole.physics.simulation import LARGEST_SANE, Simulation, check_sane
 
 quick = settings(max_examples=200)
@@ -163,7 +163,7 @@ def test_several_poles_are_observed_and_judged_as_one_is(state):
 @pytest.mark.parametrize("values", [[], [0.0], [-3.0, 2.0], [2.0, -3.0], [1e-320, -1e308]])
 def test_the_farthest_value(values):
     expected = max(map(abs, values), default=0.0)
-    assert task.farthest(values) == expected
+    assert task.max_abs(values) == expected
     assert stepping._farthest(np.array(values)) == expected
 
 
@@ -172,5 +172,5 @@ def test_the_farthest_value(values):
 def test_the_farthest_value_loses_no_nan(bad, place):
     values = [0.1, -0.2, 0.3]
     values[place] = bad
-    assert math.isnan(task.farthest(values))
+    assert math.isnan(task.max_abs(values))
     assert math.isnan(stepping._farthest(np.array(values)))

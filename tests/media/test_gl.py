@@ -8,7 +8,7 @@ import pytest
 
 from mjcartpole.errors import RenderError
 from mjcartpole.media import gl
-from mjcartpole.media.trial import Trial
+from mjcartpole.media.backend_probe import Trial
 
 
 def run(code: str, **environment: str) -> "subprocess.CompletedProcess[str]":
@@ -144,7 +144,7 @@ FORGETFUL = """
     import os
     from mjcartpole.media import gl
     from mjcartpole.media.renderer import open_renderer
-    from mjcartpole.physics.model import load_model
+    from mjcartpole.physics.load import load_model
 
     before = dict(os.environ)
     cartpole = load_model()
@@ -191,7 +191,7 @@ FORKING = """
     import multiprocessing, sys
     import numpy as np
     from mjcartpole.media.renderer import open_renderer
-    from mjcartpole.physics.model import load_model
+    from mjcartpole.physics.load import load_model
 
     def draw(kind):
         with open_renderer(load_model(), width=32, height=32) as renderer:
@@ -324,7 +324,7 @@ MANY = """
 BESIDE = """
     import mujoco
     from mjcartpole.media.renderer import open_renderer
-    from mjcartpole.physics.model import load_model
+    from mjcartpole.physics.load import load_model
 
     cartpole = load_model()
     data = mujoco.MjData(cartpole.model)

@@ -7,11 +7,11 @@ import pytest
 from PIL import Image
 
 from mjcartpole.errors import RenderError
-from mjcartpole.media.lettering import INK, PAPER, Lettering
+from mjcartpole.media.hud import ACTION, Moment, Strip
 from mjcartpole.media.overlay import Overlay
 from mjcartpole.media.renderer import open_renderer
-from mjcartpole.media.strip import ACTION, Moment, Strip
-from mjcartpole.physics.model import load_model, models_folder
+from mjcartpole.media.text import INK, PAPER, Lettering
+from mjcartpole.physics.load import load_model, models_folder
 
 DOCUMENT = (models_folder() / "cartpole.xml").read_text(encoding="utf-8")
 SIZES = [(320, 240), (640, 480), (1920, 1080)]

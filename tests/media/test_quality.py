@@ -9,7 +9,7 @@ from mjcartpole.media import gl
 from mjcartpole.media.quality import level_of
 from mjcartpole.media.renderer import open_renderer
 from mjcartpole.media.scene import Scene
-from mjcartpole.physics.model import load_model, models_folder
+from mjcartpole.physics.load import load_model, models_folder
 
 STATE = (0.4, 0.0, 0.13, 0.0)
 DOCUMENT = (models_folder() / "cartpole.xml").read_text(encoding="utf-8")

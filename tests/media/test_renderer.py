@@ -11,11 +11,11 @@ import pytest
 from mjcartpole.errors import RenderError
 from mjcartpole.media import gl
 from mjcartpole.media import renderer as renderer_module
+from mjcartpole.media.hud import Moment
 from mjcartpole.media.overlay import Overlay
 from mjcartpole.media.renderer import GLRenderer, open_renderer
 from mjcartpole.media.scene import Scene
-from mjcartpole.media.strip import Moment
-from mjcartpole.physics.model import load_model
+from mjcartpole.physics.load import load_model
 
 WIDTH, HEIGHT = 640, 480
 HALF_VIEW = 9 * math.tan(math.radians(26) / 2) * WIDTH / HEIGHT
@@ -316,7 +316,7 @@ def test_egl_osmesa_and_sketch_show_the_same(cartpole, tmp_path):
     code = """
 import sys, numpy
 from mjcartpole.media.renderer import open_renderer
-from mjcartpole.physics.model import load_model
+from mjcartpole.physics.load import load_model
 kind, states, path = sys.argv[1:]
 with open_renderer(load_model(), kind=kind) as renderer:
     assert renderer.kind == kind

@@ -9,7 +9,7 @@ import pytest
 from mjcartpole import task
 from mjcartpole.errors import RenderError
 from mjcartpole.media.scene import Scene, check_picture
-from mjcartpole.physics.model import load_model, models_folder
+from mjcartpole.physics.load import load_model, models_folder
 
 DOCUMENT = (models_folder() / "cartpole.xml").read_text(encoding="utf-8")
 LONG = DOCUMENT.replace('fromto="0 0 0 0 0 1"', 'fromto="0 0 0 0 0 2"')

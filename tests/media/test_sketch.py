@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mjcartpole.media.renderer import open_renderer
-from mjcartpole.physics.model import load_model
+from mjcartpole.physics.load import load_model
 
 # One metre is 100 pixels: the camera sees 2 m of height in 200 pixels, without perspective.
 ORTHOGRAPHIC = """

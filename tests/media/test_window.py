@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from mjcartpole.media.window import NoWindow, ViewerWindow, open_window
-from mjcartpole.physics.model import load_model
+from mjcartpole.physics.load import load_model
 
 SCREEN = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
 

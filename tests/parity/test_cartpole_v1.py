@@ -9,7 +9,7 @@ import pytest
 from gymnasium.utils.env_match import check_environments_match
 
 from mjcartpole import task
-from mjcartpole.physics.model import load_model
+from mjcartpole.physics.load import load_model
 
 KINEMATICS = {"gym": "euler", "mujoco": "semi-implicit"}
 
@@ -22,7 +22,7 @@ def pair(integrator="gym", **arguments):
     return ours, reference
 
 
-def put(env, state):
+def set_state(env, state):
     """Put either env into a state, in the middle of an episode."""
     env.reset()
     env.unwrapped.state = np.array(state)
@@ -87,8 +87,8 @@ def test_teacher_forced_transitions(integrator, sutton_barto):
     box = np.array([2.5, 4.0, 0.22, 4.0])
     for _ in range(5_000):
         state, action = rng.uniform(-box, box), int(rng.integers(2))
-        put(ours, state)
-        put(reference, state)
+        set_state(ours, state)
+        set_state(reference, state)
         got, expected = ours.step(action), reference.step(action)
         np.testing.assert_allclose(ours.state, reference.state, rtol=0, atol=1e-12)
         np.testing.assert_array_equal(got[0], expected[0])
@@ -121,8 +121,8 @@ def test_both_sides_of_every_limit(place, limit, sutton_barto):
         state = [0.0] * 4
         state[place] = value
         ours, reference = pair(sutton_barto_reward=sutton_barto)
-        put(ours, state)
-        put(reference, state)
+        set_state(ours, state)
+        set_state(reference, state)
         got, expected = ours.step(1), reference.step(1)
         assert got[1:] == expected[1:]
         np.testing.assert_array_equal(got[0], expected[0])
@@ -160,7 +160,7 @@ def test_a_state_that_comes_back_into_play_is_paid_again():
     ours, reference = (env.unwrapped for env in pair())
     results = []
     for env in (ours, reference):
-        put(env, [3.0, 0.0, 0.0, 0.0])
+        set_state(env, [3.0, 0.0, 0.0, 0.0])
         first = env.step(1)
         env.state = np.array([0.0, 0.0, 0.0, 0.0])
         second = env.step(1)

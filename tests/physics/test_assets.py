@@ -12,8 +12,8 @@ from PIL import Image
 from mjcartpole.errors import ModelError, ModelNotFoundError
 from mjcartpole.learning.run_model import check_storable, write_model
 from mjcartpole.physics.assets import is_stored
-from mjcartpole.physics.model import load_model, load_stored, same_model
-from mjcartpole.physics.reading import read_whole
+from mjcartpole.physics.includes import read_whole
+from mjcartpole.physics.load import load_model, load_stored, same_model
 
 MESH = '<mesh name="m" file="{}"/>'
 TEXTURE = '<texture name="t" type="2d" file="{}"/>'

@@ -8,7 +8,7 @@ from mujoco.batch import Batch
 
 from mjcartpole.physics import batch_simulation
 from mjcartpole.physics.batch_simulation import BatchSimulation, available_cores
-from mjcartpole.physics.model import load_model
+from mjcartpole.physics.load import load_model
 
 MODEL = load_model("cartpole", {"joint:hinge.damping": 0.01})
 MANY = 64
@@ -27,9 +27,9 @@ def with_two_ways(slow, monkeypatch, integrator="gym"):
     """A simulation of many that has a choice on any machine, of which one way is slow."""
     monkeypatch.setattr(batch_simulation, "available_cores", lambda: 2)
     simulation = BatchSimulation(MODEL, MANY, integrator)
-    crew, alone = simulation._batch, simulation._other
-    assert (crew.nthread, alone.nthread) == (2, 1)
-    taken = alone if slow == "alone" else crew
+    runner, alone = simulation._batch, simulation._other
+    assert (runner.nthread, alone.nthread) == (2, 1)
+    taken = alone if slow == "alone" else runner
     replaced = SlowBatch(taken.model, MANY, taken.nthread)
     if slow == "alone":
         simulation._other = replaced
@@ -55,7 +55,7 @@ def test_changing_threads_changes_no_bit(integrator, monkeypatch):
     plain = BatchSimulation(MODEL, MANY, integrator, threads=1)
     starts = np.random.default_rng(0).uniform(-0.05, 0.05, (MANY, 4))
     for each in (simulation, plain):
-        each.put(slice(None), starts)
+        each.set_state(slice(None), starts)
     seen = set()
     for controls in np.random.default_rng(1).choice([-1.0, 1.0], (40, MANY)):
         for each in (simulation, plain):
@@ -79,12 +79,12 @@ def test_changing_threads_changes_no_bit(integrator, monkeypatch):
         (1024, 0.02, 1, 1),
     ],
 )
-def test_few_simulations_never_wake_many_threads(n, timestep, cores, crew, monkeypatch):
+def test_few_simulations_never_wake_many_threads(n, timestep, cores, runner, monkeypatch):
     monkeypatch.setattr(batch_simulation, "available_cores", lambda: cores)
     cartpole = load_model("cartpole", {"option.timestep": timestep})
     simulation = BatchSimulation(cartpole, n)
-    assert simulation.threads == crew
-    assert (simulation._other is None) == (crew == 1)
+    assert simulation.threads == runner
+    assert (simulation._other is None) == (runner == 1)
     assert BatchSimulation(cartpole, n, threads=3).threads == min(3, n)
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from mjcartpole.physics.describe import Description, axis_name, describe
-from mjcartpole.physics.model import load_model, models_folder
+from mjcartpole.physics.load import load_model, models_folder
 from mjcartpole.physics.simulation import Simulation
 
 MODELS = sorted((Path(__file__).parent / "models").glob("*.xml"))

@@ -4,7 +4,7 @@ import pytest
 
 from mjcartpole.physics.deviations import deviations
 from mjcartpole.physics.equations import CARTPOLE_V1
-from mjcartpole.physics.model import load_model
+from mjcartpole.physics.load import load_model
 from mjcartpole.physics.parameters import read_parameters
 
 REFERENCE = load_model("cartpole").xml

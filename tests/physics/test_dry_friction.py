@@ -6,7 +6,7 @@ import pytest
 from mjcartpole.errors import ConfigError
 from mjcartpole.physics.dry_friction import DryFriction, friction_forces
 from mjcartpole.physics.equations import accelerations
-from mjcartpole.physics.model import load_model
+from mjcartpole.physics.load import load_model
 from mjcartpole.physics.parameters import read_parameters
 from mjcartpole.physics.simulation import Simulation
 

@@ -6,7 +6,7 @@ import pytest
 
 from mjcartpole.physics.engine_check import unexplained_forces
 from mjcartpole.physics.free_region import free_region
-from mjcartpole.physics.model import load_model, model_names
+from mjcartpole.physics.load import load_model, model_names
 from mjcartpole.physics.parameters import read_parameters
 
 REFERENCE = load_model("cartpole").xml

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mjcartpole.physics.file_steps import METHODS, file_step, method_of
-from mjcartpole.physics.model import load_model
+from mjcartpole.physics.load import load_model
 from mjcartpole.physics.parameters import read_parameters
 from mjcartpole.physics.simulation import Simulation
 

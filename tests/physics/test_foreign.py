@@ -18,7 +18,7 @@ from mjcartpole.learning.run_model import check_storable
 from mjcartpole.learning.training import train
 from mjcartpole.media.renderer import open_renderer
 from mjcartpole.physics.describe import describe
-from mjcartpole.physics.model import load_model, models_folder, same_model
+from mjcartpole.physics.load import load_model, models_folder, same_model
 from mjcartpole.physics.playable import why_unplayable
 from mjcartpole.physics.simulation import Simulation
 

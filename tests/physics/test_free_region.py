@@ -7,7 +7,7 @@ import pytest
 
 from mjcartpole import task
 from mjcartpole.physics.free_region import FreeRegion, free_region
-from mjcartpole.physics.model import load_model
+from mjcartpole.physics.load import load_model
 
 REFERENCE = load_model("cartpole").xml
 ANYWHERE = (-math.inf, math.inf)

@@ -12,8 +12,8 @@ import pytest
 
 from mjcartpole.errors import ModelError
 from mjcartpole.physics.guard import compile_document
-from mjcartpole.physics.model import load_model, model_names, models_folder, same_model
-from mjcartpole.physics.reading import read_whole
+from mjcartpole.physics.includes import read_whole
+from mjcartpole.physics.load import load_model, model_names, models_folder, same_model
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="limits of Linux processes")
 
@@ -139,7 +139,7 @@ def points(number):
 LOADER = """
 import json, resource, sys
 from mjcartpole.errors import ModelError
-from mjcartpole.physics.model import load_model
+from mjcartpole.physics.load import load_model
 try:
     load_model(sys.argv[1])
     said = ""

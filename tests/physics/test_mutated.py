@@ -40,7 +40,7 @@ FOREIGN = (
 @functools.cache
 def bases() -> list[str]:
     """Whole documents to be damaged."""
-    from mjcartpole.physics.model import load_model
+    from mjcartpole.physics.load import load_model
 
     tests = Path(__file__).parents[1]
     files = [*(tests / "physics" / "models").glob("*.xml"), *(tests / "models").glob("*.xml")]

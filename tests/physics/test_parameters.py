@@ -11,7 +11,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mjcartpole.errors import ModelError
-from mjcartpole.physics.beyond import beyond_equations, beyond_step
 from mjcartpole.physics.equations import (
     CARTPOLE_V1,
     Parameters,
@@ -20,12 +19,10 @@ from mjcartpole.physics.equations import (
     step,
     uniform_rod,
 )
-from mjcartpole.physics.model import load_model, model_names
-from mjcartpole.physics.parameters import (
-    differences,
-    read_parameters,
-)
+from mjcartpole.physics.load import load_model, model_names
+from mjcartpole.physics.parameters import differences, read_parameters
 from mjcartpole.physics.simulation import Simulation
+from mjcartpole.physics.unmodelled_effects import beyond_equations, beyond_step
 
 REFERENCE = load_model("cartpole").xml
 EPS = np.finfo(float).eps

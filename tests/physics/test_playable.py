@@ -7,7 +7,7 @@ import pytest
 
 from mjcartpole import task
 from mjcartpole.physics import playable
-from mjcartpole.physics.model import load_model, model_names, models_folder
+from mjcartpole.physics.load import load_model, model_names, models_folder
 from mjcartpole.physics.playable import why_unplayable
 from mjcartpole.physics.simulation import Simulation
 
@@ -115,7 +115,7 @@ def lasted(simulation, start, actions) -> int:
     simulation.state = start[: simulation.size]
     for done, action in enumerate(actions, start=1):
         state = simulation.step(simulation.cartpole.controls[action])
-        if task.has_terminated(state[0], task.farthest(state[2::2])):
+        if task.has_terminated(state[0], task.max_abs(state[2::2])):
             return done
     return len(actions) + 1
 

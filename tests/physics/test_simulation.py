@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mjcartpole.errors import ConfigError, SimulationError
-from mjcartpole.physics.model import load_model
+from mjcartpole.physics.load import load_model
 from mjcartpole.physics.simulation import Simulation, check_sane, stepping_model
 
 CARTPOLE = load_model("cartpole")
@@ -78,11 +78,11 @@ def test_a_step_depends_on_the_state_alone():
 
 def test_plain_floats_put_a_state_as_the_setter_does():
     state = (0.1, -0.2, 0.05, 0.3)
-    set_, put = Simulation(CARTPOLE), Simulation(CARTPOLE)
+    set_, set_state = Simulation(CARTPOLE), Simulation(CARTPOLE)
     set_.state = state
-    put.put(state)
-    np.testing.assert_array_equal(put.state, state)
-    assert put.step(1.0) == set_.step(1.0)
+    set_state.set_state(state)
+    np.testing.assert_array_equal(set_state.state, state)
+    assert set_state.step(1.0) == set_.step(1.0)
 
 
 def test_nothing_of_the_past_remains_in_a_new_state():
@@ -238,7 +238,7 @@ def _assert_same_motion(model, stepped):
 def test_a_copy_goes_on_bit_equal_and_alone(name, integrator, copied):
     cartpole = load_model(name)
     simulation = Simulation(cartpole, integrator)
-    simulation.put([0.1] * simulation.size)
+    simulation.set_state([0.1] * simulation.size)
     for turn in range(40):
         simulation.step(cartpole.controls[turn % 2])
     simulation.model.opt.gravity[2] += 1.0

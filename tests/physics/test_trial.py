@@ -8,7 +8,7 @@ import pytest
 
 from mjcartpole.physics import trial
 from mjcartpole.physics.library import libmujoco
-from mjcartpole.physics.model import models_folder
+from mjcartpole.physics.load import models_folder
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="limits of Linux processes")
 

@@ -15,9 +15,17 @@ from mjcartpole.learning.policy import Policy
 from mjcartpole.media.montage import state_at
 from mjcartpole.media.overlay import Overlay
 from mjcartpole.media.renderer import open_renderer
-from mjcartpole.physics.model import load_model
+from mjcartpole.physics.load import load_model
 from mjcartpole.studies.evaluation import SEED, evaluate
-from mjcartpole.studies.film import FALL_SECONDS, FALL_SPEED, Film, Look, Stage, Take, play
+from mjcartpole.studies.film import (
+    FALL_SECONDS,
+    FALL_SPEED,
+    Film,
+    PolicySetup,
+    Rollout,
+    VideoOptions,
+    play,
+)
 from mjcartpole.task import CONTROL_STEP
 
 WIDTH, HEIGHT = 160, 120
@@ -44,11 +52,11 @@ def balancing_policy():
 
 @pytest.fixture(scope="module")
 def take():
-    return play(Stage("some", some_policy()))[0]
+    return play(PolicySetup("some", some_policy()))[0]
 
 
 def drawn(casts, **look):
-    with Film(casts, Look(**{**SMALL, **look})) as film:
+    with Film(casts, VideoOptions(**{**SMALL, **look})) as film:
         frames = [frame.copy() for frame in film.frames()]
         assert len(frames) == film.length
     return frames
@@ -63,8 +71,8 @@ def renderer():
 @BACKENDS
 @pytest.mark.parametrize("seed", [SEED, 7])
 def test_a_take_is_what_the_environment_does(backend, seed):
-    stage = Stage("some", some_policy(), backend, seed=seed)
-    take = play(stage)[0]
+    setup = PolicySetup("some", some_policy(), backend, seed=seed)
+    take = play(setup)[0]
     env = gymnasium.make({"mujoco": "mjcartpole/CartPole-v1", "gym": "CartPole-v1"}[backend])
     observation, _ = env.reset(seed=seed)
     over, total = False, 0.0
@@ -74,7 +82,7 @@ def test_a_take_is_what_the_environment_does(backend, seed):
         assert (moment.step, moment.total) == (step, total)
         if over:
             break
-        assert moment.action == stage.policy(observation)
+        assert moment.action == setup.policy(observation)
         observation, reward, terminated, truncated, _ = env.step(moment.action)
         over, total = terminated or truncated, total + reward
     assert over
@@ -85,14 +93,14 @@ def test_a_take_is_what_the_environment_does(backend, seed):
 
 @BACKENDS
 def test_the_episodes_are_the_first_of_an_evaluation(backend):
-    takes = play(Stage("some", some_policy(), backend), 5)
+    takes = play(PolicySetup("some", some_policy(), backend), 5)
     result = evaluate(some_policy(), backend=backend, episodes=5)
     assert [take.episode.total for take in takes] == result.returns.tolist()
     assert len({tuple(take.states[0]) for take in takes}) == 5
 
 
 def test_a_moment_shows_the_table_s_row(take):
-    policy = take.stage.policy
+    policy = take.setup.policy
     actions = set()
     for step in range(take.episode.steps):
         moment = take.moment(step)
@@ -122,7 +130,7 @@ def test_a_place_that_rounding_has_moved_belongs_to_its_step(take):
     steps = take.episode.steps
     assert take.moment(steps - 4e-15).action is None
     for fps in (30, 48, 60, 75):
-        places = Look(fps=fps, speed=0.29).places(len(take.states))
+        places = VideoOptions(fps=fps, speed=0.29).places(len(take.states))
         whole = [place for place in places if abs(place - round(place)) < 1e-9]
         assert [take.moment(place).step for place in whole] == [round(place) for place in whole]
 
@@ -140,7 +148,7 @@ def test_a_film_lasts_as_long_as_its_motion(take, renderer, speed, fps, per_step
 
 
 def test_slow_motion_lies_between_the_states(take):
-    places = Look(speed=0.25).places(len(take.states))
+    places = VideoOptions(speed=0.25).places(len(take.states))
     states = np.array([state_at(take.states, place) for place in places])
     assert np.array_equal(states[::4], take.states)
     middle = (take.states[1:] + take.states[:-1]) / 2
@@ -149,9 +157,9 @@ def test_slow_motion_lies_between_the_states(take):
 
 @pytest.mark.parametrize("fps", [25, 50])
 def test_a_fall_is_the_last_second_in_slow_motion(fps):
-    take = play(Stage("balancing", balancing_policy(), seed=3))[0]
+    take = play(PolicySetup("balancing", balancing_policy(), seed=3))[0]
     steps = take.episode.steps
-    places = Look(fall=True, fps=fps).places(len(take.states))
+    places = VideoOptions(fall=True, fps=fps).places(len(take.states))
     shown = FALL_SECONDS / CONTROL_STEP
     assert steps > 2 * shown
     assert (places[0], places[-1]) == (steps - shown, steps)
@@ -162,12 +170,12 @@ def test_a_fall_is_the_last_second_in_slow_motion(fps):
 
 def test_the_fall_of_an_episode_shorter_than_a_second_is_all_of_it(take):
     assert take.episode.steps < 50
-    places = Look(fall=True).places(len(take.states))
+    places = VideoOptions(fall=True).places(len(take.states))
     assert (places[0], places[-1]) == (0, take.episode.steps)
 
 
 def test_what_gymnasium_moves_is_drawn_with_our_model(renderer):
-    take = play(Stage("some", some_policy(), "gym"))[0]
+    take = play(PolicySetup("some", some_policy(), "gym"))[0]
     frames = drawn([[take]])
     for index in (0, len(frames) // 2, -1):
         assert np.array_equal(frames[index], renderer.render(take.states[index]))
@@ -186,12 +194,12 @@ def test_an_overlay_shows_the_moment_of_each_frame(take):
 
 
 def test_several_start_alike_and_each_is_what_it_is_alone():
-    stages = [
-        Stage("mujoco", some_policy()),
-        Stage("gym", some_policy(), "gym"),
-        Stage("other", some_policy(1)),
+    setups = [
+        PolicySetup("mujoco", some_policy()),
+        PolicySetup("gym", some_policy(), "gym"),
+        PolicySetup("other", some_policy(1)),
     ]
-    casts = [play(stage) for stage in stages]
+    casts = [play(setup) for setup in setups]
     starts = [takes[0].states[0] for takes in casts]
     assert np.array_equal(starts[0], starts[1])
     assert np.array_equal(starts[0], starts[2])
@@ -205,7 +213,7 @@ def test_several_start_alike_and_each_is_what_it_is_alone():
 
 
 def test_several_begin_each_episode_together():
-    casts = [play(Stage(f"{seed}", some_policy(seed)), 3) for seed in (0, 1)]
+    casts = [play(PolicySetup(f"{seed}", some_policy(seed)), 3) for seed in (0, 1)]
     lengths = [[len(take.states) for take in takes] for takes in casts]
     assert lengths[0] != lengths[1]
     frames = drawn(casts)
@@ -219,7 +227,7 @@ def test_several_begin_each_episode_together():
 
 
 def test_a_contact_sheet_goes_from_the_first_to_the_last_state(take, renderer):
-    with Film([[take]], Look(**SMALL)) as film:
+    with Film([[take]], VideoOptions(**SMALL)) as film:
         sheet = film.contact_sheet(10)
     assert sheet.shape[1] == 5 * WIDTH + 4 * 2
     assert np.array_equal(sheet[:HEIGHT, :WIDTH], renderer.render(take.states[0]))
@@ -228,7 +236,7 @@ def test_a_contact_sheet_goes_from_the_first_to_the_last_state(take, renderer):
 
 
 def test_a_contact_sheet_of_few_frames_shows_each_once(take):
-    with Film([[take]], Look(**SMALL, speed=10)) as film:
+    with Film([[take]], VideoOptions(**SMALL, speed=10)) as film:
         assert film.length == take.episode.steps // 10 + 1
         assert film.contact_sheet(10).shape[1] == film.length * (WIDTH + 2) - 2
 
@@ -254,15 +262,15 @@ def test_a_contact_sheet_of_few_frames_shows_each_once(take):
 )
 def test_a_look_that_makes_no_sense_is_refused(take, look, message):
     with pytest.raises(RenderError) as refused:
-        Film([[take]], Look(**look))
+        Film([[take]], VideoOptions(**look))
     assert message in str(refused.value)
 
 
 def test_no_episode_and_no_seed_are_refused():
     with pytest.raises(ConfigError, match="episodes must be a whole number from 1 up, not 0"):
-        play(Stage("some", some_policy()), 0)
+        play(PolicySetup("some", some_policy()), 0)
     with pytest.raises(ConfigError, match="seed must be a whole number from 0 up, not -1"):
-        play(Stage("some", some_policy(), seed=-1))
+        play(PolicySetup("some", some_policy(), seed=-1))
 
 
 LONG = """
@@ -303,11 +311,19 @@ def test_a_film_takes_the_time_that_control_steps_take():
     cartpole = load_model("cartpole", {"timestep": 0.01}, own_timestep=True)
     states = np.zeros((101, 4))
     slow, quick = (
-        Take(Stage("it", some_policy(), model=model), Episode(0, 100.0, 100, "time limit"), states)
+        Rollout(
+            PolicySetup("it", some_policy(), model=model),
+            Episode(0, 100.0, 100, "time limit"),
+            states,
+        )
         for model in ("cartpole", cartpole)
     )
-    assert slow.places(Look()).tolist() == list(range(101))
-    assert quick.places(Look()).tolist() == list(range(0, 101, 2))
-    assert len(slow.places(Look(fall=True))) == len(quick.places(Look(fall=True))) == 201
-    assert quick.places(Look(fall=True))[0] == 0.0
-    assert slow.places(Look(fall=True))[0] == 50.0
+    assert slow.places(VideoOptions()).tolist() == list(range(101))
+    assert quick.places(VideoOptions()).tolist() == list(range(0, 101, 2))
+    assert (
+        len(slow.places(VideoOptions(fall=True)))
+        == len(quick.places(VideoOptions(fall=True)))
+        == 201
+    )
+    assert quick.places(VideoOptions(fall=True))[0] == 0.0
+    assert slow.places(VideoOptions(fall=True))[0] == 50.0

@@ -14,12 +14,12 @@ from mjcartpole import cli
 from mjcartpole.errors import ConfigError
 from mjcartpole.physics import equations, linear
 from mjcartpole.physics.equations import CARTPOLE_V1, uniform_rod
-from mjcartpole.physics.model import load_model
+from mjcartpole.physics.load import load_model
 from mjcartpole.studies.parity import RUNGS, Figure, Result, Subject, run_ladder
+from mjcartpole.studies.parity.case import Batch, set_parameters, why_not_gymnasiums
 from mjcartpole.studies.parity.convergence import _order_figures
 from mjcartpole.studies.parity.diagnosis import likely_cause
 from mjcartpole.studies.parity.dynamics import EPS, gym_steps, step_gym
-from mjcartpole.studies.parity.subject import Batch, set_parameters, why_not_gymnasiums
 from mjcartpole.studies.parity.trajectories import predicted_growth
 
 REFERENCE = load_model("cartpole").xml

@@ -9,8 +9,8 @@ import pytest
 from mjcartpole.errors import ConfigError, ModelError
 from mjcartpole.learning.discretizer import Discretizer
 from mjcartpole.learning.policy import Policy
-from mjcartpole.physics.edit import edit_document
-from mjcartpole.physics.model import load_model
+from mjcartpole.physics.edit.edits import edit_document
+from mjcartpole.physics.load import load_model
 from mjcartpole.studies import sweep as module
 from mjcartpole.studies.evaluation import evaluate
 from mjcartpole.studies.sweep import Stretch, SweepResult, parse_sweep, sweep

@@ -9,7 +9,7 @@ import pytest
 from mjcartpole.errors import ConfigError, ModelError, ModelNotFoundError
 from mjcartpole.learning.discretizer import Discretizer
 from mjcartpole.learning.policy import Policy
-from mjcartpole.physics.model import load_model
+from mjcartpole.physics.load import load_model
 from mjcartpole.studies.evaluation import evaluate
 from mjcartpole.studies.transfer import Place, find_place, transfer
 

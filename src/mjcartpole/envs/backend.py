@@ -10,7 +10,7 @@ from mjcartpole.errors import ConfigError
 from mjcartpole.integrator import Integrator, check_integrator
 
 if TYPE_CHECKING:
-    from mjcartpole.physics.model import ModelLike
+    from mjcartpole.physics.load import ModelLike
 
 Backend = Literal["mujoco", "gym"]
 

@@ -20,14 +20,8 @@ from mjcartpole.errors import InvalidActionError, ResetNeededError
 from mjcartpole.integrator import Integrator
 from mjcartpole.media.renderer import DEFAULT_HEIGHT, DEFAULT_WIDTH
 from mjcartpole.media.scene import DEFAULT_CAMERA
-from mjcartpole.physics.model import CartPole, Edits, ModelLike, load_shared
-from mjcartpole.physics.simulation import (
-    FARTHEST_SANE,
-    Simulation,
-    State,
-    as_one_pole,
-    check_sane,
-)
+from mjcartpole.physics.load import CartPole, Edits, ModelLike, load_shared
+from mjcartpole.physics.simulation import FARTHEST_SANE, Simulation, State, as_one_pole, check_sane
 
 # What `step` needs, as plain globals: the fewest look-ups and no sign to change.
 _INT64 = np.int64
@@ -355,7 +349,7 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int], CartPo
             simulation = self._begin(edits)
         super().reset(seed=seed)
         state = self.np_random.uniform(low=low, high=high, size=simulation.size)
-        simulation.put(state.tolist())
+        simulation.set_state(state.tolist())
         # Attributes are set where they change only: that takes as long as a step's arithmetic.
         if self._advance is not self._move:
             self._advance = self._move

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from mjcartpole import task
 from mjcartpole.errors import ConfigError
-from mjcartpole.physics.model import CartPole, Edits, ModelLike, load_model
+from mjcartpole.physics.load import CartPole, Edits, ModelLike, load_model
 
 try:
     with warnings.catch_warnings():
@@ -100,7 +100,7 @@ class Physics(mujoco.Physics):  # type: ignore[misc]
         joints = list(self.cartpole.joints)
         return np.column_stack([self.data.qpos[joints], self.data.qvel[joints]]).ravel()
 
-    def put(self, state: npt.NDArray[np.float64]) -> None:
+    def set_state(self, state: npt.NDArray[np.float64]) -> None:
         """Put the cart-pole into a state; inside `reset_context`."""
         joints = list(self.cartpole.joints)
         self.data.qpos[joints], self.data.qvel[joints] = state[0::2], state[1::2]
@@ -188,7 +188,7 @@ class Balance(control.Task):  # type: ignore[misc]
         """Draw a starting state."""
         low, high = task.RESET_LOW, task.RESET_HIGH
         size = 2 * len(physics.cartpole.joints)
-        physics.put(self.random.uniform(low=low, high=high, size=size))
+        physics.set_state(self.random.uniform(low=low, high=high, size=size))
         self._show_reward(physics)
         self.steps = 0
 

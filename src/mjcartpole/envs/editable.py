@@ -6,8 +6,8 @@ from typing import Final
 
 from mjcartpole.errors import ConfigError
 from mjcartpole.integrator import Integrator, check_integrator
-from mjcartpole.physics.edit import edits_of
-from mjcartpole.physics.model import INTEGRATORS, CartPole, Edits, load_shared, own_copy
+from mjcartpole.physics.edit.edits import edits_of
+from mjcartpole.physics.load import INTEGRATORS, CartPole, Edits, load_shared, own_copy
 from mjcartpole.physics.simulation import Simulation
 
 KINEMATICS: Final = {"euler": "", "semi-implicit": "Euler"} | {

@@ -18,7 +18,7 @@ from mjcartpole.integrator import Integrator
 from mjcartpole.media.renderer import DEFAULT_HEIGHT, DEFAULT_WIDTH, Renderer, open_renderer
 from mjcartpole.media.scene import DEFAULT_CAMERA, check_picture
 from mjcartpole.physics.batch_simulation import BatchSimulation
-from mjcartpole.physics.model import Edits, ModelLike, load_model
+from mjcartpole.physics.load import Edits, ModelLike, load_model
 
 VectorRenderMode = Literal["rgb_array", "rgb_array_list"]
 
@@ -196,7 +196,7 @@ class CartPoleVectorEnv(
                 f"{', '.join(task.state_names(self.cartpole.poles))}, one column per environment, "
                 f"not the shape {values.shape}"
             )
-        self._simulation.put(_EVERYONE, values.T)
+        self._simulation.set_state(_EVERYONE, values.T)
         self._has_state = True
 
     def reset(
@@ -220,7 +220,7 @@ class CartPoleVectorEnv(
         who = self._mask((options or {}).get("reset_mask"))
         super().reset(seed=seed)
         self._bounds = bounds
-        self._simulation.put(who, self._draw(who.size))
+        self._simulation.set_state(who, self._draw(who.size))
         self._has_state = True
         self._deadlines[who] = self._clock + self.max_episode_steps
         self._ended = np.setdiff1d(self._ended, who, assume_unique=True)
@@ -275,7 +275,7 @@ class CartPoleVectorEnv(
         restarted = self._ended
         if restarted.size:
             # Their step is thrown away, as gymnasium does: cheaper than to choose who steps.
-            self._simulation.put(restarted, self._draw(restarted.size))
+            self._simulation.set_state(restarted, self._draw(restarted.size))
             self._deadlines[restarted] = self._clock + self.max_episode_steps
         terminations = self._have_terminated()
         truncations = self._deadlines <= self._clock

@@ -27,7 +27,7 @@ import numpy as np
 import numpy.typing as npt
 
 from mjcartpole.errors import CheckpointError
-from mjcartpole.files import brief, names_in, opened, replacing, sync
+from mjcartpole.files import atomic_write, brief, names_in, opened, sync
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.episodes import ENDINGS, Columns
 from mjcartpole.learning.stored import Fields, checked, parse
@@ -104,7 +104,7 @@ def save_checkpoint(folder: Path, checkpoint: Checkpoint) -> None:
     """
     latest, previous = folder / LATEST, folder / PREVIOUS
     content = _pack(checkpoint)
-    with replacing(latest) as temporary:
+    with atomic_write(latest) as temporary:
         temporary.write_bytes(content)
         sync(temporary)
         # Killed right here, a training goes on from the previous one, which is as good.
@@ -193,7 +193,7 @@ def keep_only(folder: Path, path: Path) -> None:
         FileError: The folder cannot be written.
     """
     if path.absolute() != (folder / LATEST).absolute():
-        with replacing(folder / LATEST) as temporary:
+        with atomic_write(folder / LATEST) as temporary:
             shutil.copyfile(path, temporary, follow_symlinks=False)
 
 

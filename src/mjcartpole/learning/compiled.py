@@ -18,16 +18,10 @@ from mjcartpole.learning.episodes import EpisodeLog
 from mjcartpole.learning.loop import in_episode
 from mjcartpole.learning.policy import Policy
 from mjcartpole.learning.qlearning import TabularQ
-from mjcartpole.learning.stepping import (
-    GymPhysics,
-    MujocoPhysics,
-    Physics,
-    PolesPhysics,
-    link,
-)
+from mjcartpole.learning.stepping import GymPhysics, MujocoPhysics, Physics, PolesPhysics, link
 from mjcartpole.physics.cartpole_v1 import FORCE
 from mjcartpole.physics.library import libmujoco
-from mjcartpole.physics.model import CartPole, ModelLike, load_model
+from mjcartpole.physics.load import CartPole, ModelLike, load_model
 from mjcartpole.physics.simulation import Simulation, check_sane
 
 CHUNK_STEPS: Final = 50_000

@@ -15,7 +15,7 @@ from mjcartpole.learning.discretizer import Discretizer, is_finite
 from mjcartpole.learning.qlearning import Ties
 
 if TYPE_CHECKING:
-    from mjcartpole.physics.model import CartPole
+    from mjcartpole.physics.load import CartPole
 
 MAX_SEED: Final = 2**128 - 1
 """A generator's state has as many bits."""
@@ -174,7 +174,7 @@ class TrainConfig:
             ModelError: It cannot be used.
             ConfigError: An edit makes no sense.
         """
-        from mjcartpole.physics.model import load_model  # noqa: PLC0415 - it imports MuJoCo
+        from mjcartpole.physics.load import load_model  # noqa: PLC0415 - it imports MuJoCo
 
         return load_model(self.model, self.set, own_timestep=self.own_timestep)
 

@@ -30,7 +30,7 @@ _SUMMARY_FIELDS: Final[Fields] = {
     },
     "video?": str,
 }
-"""What `conclude` writes (see studies/conduct.py)."""
+"""What `conclude` writes (see studies/finish_training.py)."""
 
 
 def read_config(folder: Path) -> tuple[str, bool, TrainConfig]:

@@ -77,7 +77,7 @@ _row_of = compiled(discretizer.row_of)
 _choose = compiled(qlearning.choose)
 _learn_step = compiled(qlearning.learn_step)
 _learn_episode = compiled(qlearning.learn_episode)
-_on_line = compiled(schedules.on_line)
+_linear = compiled(schedules.linear)
 _reward = compiled(task.reward)
 _ending_index = compiled(episodes.ending_index)
 
@@ -224,8 +224,8 @@ def _make_learn_chunk(sources: str) -> Callable[..., int]:
         _ = sources
         all_steps = 0
         for number in range(numbers[0], numbers[1]):
-            alpha = _on_line(method.alpha, method.alpha_final, method.slope, number)
-            epsilon = _on_line(method.epsilon, method.epsilon_final, method.slope, number)
+            alpha = _linear(method.alpha, method.alpha_final, method.slope, number)
+            epsilon = _linear(method.epsilon, method.epsilon_final, method.slope, number)
             rates = (alpha, epsilon)
             if method.stepwise:
                 played = _learn_stepwise(physics, grid, method, q, rngs, rates, scratch)

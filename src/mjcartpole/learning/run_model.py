@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Final
 
 from mjcartpole.errors import ModelError, RunError
-from mjcartpole.files import brief, read_bytes, remove, replacing, write_whole
+from mjcartpole.files import atomic_write, brief, read_bytes, remove, write_whole
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.physics.assets import is_stored, name_by_content
-from mjcartpole.physics.model import CartPole, load_stored, same_model
+from mjcartpole.physics.load import CartPole, load_stored, same_model
 
 MODEL: Final = "model.xml"
 
@@ -50,7 +50,7 @@ def write_model(folder: Path, cartpole: CartPole) -> None:
         if isinstance(source, str):
             write_whole(folder / name, source)
         elif not _has(folder / name):
-            with replacing(folder / name) as temporary:
+            with atomic_write(folder / name) as temporary:
                 shutil.copyfile(source, temporary)
     write_whole(folder / MODEL, document)
 

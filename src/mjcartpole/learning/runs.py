@@ -24,21 +24,14 @@ from pathlib import Path
 from typing import Any, Final
 
 from mjcartpole.errors import RunError
-from mjcartpole.files import (
-    is_file,
-    is_folder,
-    is_temporary,
-    names_in,
-    remove,
-    write_whole,
-)
-from mjcartpole.learning.checkpoints import (
+from mjcartpole.files import is_file, is_folder, is_temporary, names_in, remove, write_whole
+from mjcartpole.learning.checkpoints import (  # fmt: skip
     LATEST,
     PREVIOUS,
     Checkpoint,
     choose_checkpoint,
     keep_only,
-)  # fmt: skip
+)
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.documents import CONFIG, SUMMARY, read_config, read_figures
 from mjcartpole.learning.folders import LOCK, held_folder, locked_folder
@@ -53,7 +46,7 @@ from mjcartpole.learning.run_model import (
 )
 from mjcartpole.learning.training import TrainResult
 from mjcartpole.physics.assets import is_stored
-from mjcartpole.physics.model import CartPole, load_stored
+from mjcartpole.physics.load import CartPole, load_stored
 from mjcartpole.versions import version_of
 
 VERSIONS: Final = "versions.json"

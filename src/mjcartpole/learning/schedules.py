@@ -19,10 +19,10 @@ class LinearSchedule:
 
     def __call__(self, episode: int) -> float:
         """Value in an episode, counted from 0."""
-        return on_line(self.start, self.end, self.episodes, episode)
+        return linear(self.start, self.end, self.episodes, episode)
 
 
-def on_line(start: float, end: float, episodes: float, episode: int) -> float:
+def linear(start: float, end: float, episodes: float, episode: int) -> float:
     """Value of a `LinearSchedule` in an episode; Numba compiles it as it is."""
     if episode >= episodes:
         return end

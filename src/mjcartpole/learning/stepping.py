@@ -107,7 +107,7 @@ def compiled(function: F) -> F:
 
 
 _has_terminated = compiled(task.has_terminated)
-_farthest = compiled(task.farthest)
+_farthest = compiled(task.max_abs)
 _cartpole_v1_step = compiled(cartpole_v1.cartpole_v1_step)
 
 _mj_step = types.ExternalFunction("mj_step", types.void(types.intp, types.intp))

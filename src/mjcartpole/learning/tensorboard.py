@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from mjcartpole.errors import ConfigError
-from mjcartpole.files import replacing
+from mjcartpole.files import atomic_write
 from mjcartpole.learning.schedules import LinearSchedule
 from mjcartpole.learning.training import TrainResult
 
@@ -46,7 +46,7 @@ def write_events(folder: Path, result: TrainResult) -> None:
     alpha = LinearSchedule(config.alpha, config.alpha_final, slope)
     epsilon = LinearSchedule(config.epsilon, config.epsilon_final, slope)
     with (
-        replacing(folder / NAME) as temporary,
+        atomic_write(folder / NAME) as temporary,
         contextlib.closing(RecordWriter(str(temporary))) as writer,
     ):
         writer.write(Event(wall_time=0, file_version="brain.Event:2").SerializeToString())

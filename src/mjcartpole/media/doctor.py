@@ -8,8 +8,8 @@ from dataclasses import asdict, dataclass
 from typing import Any, Final, get_args
 
 from mjcartpole.media import encoders, gl
+from mjcartpole.media.backend_probe import Backend, Trial, try_backend
 from mjcartpole.media.encoders import FFmpeg
-from mjcartpole.media.trial import Backend, Trial, try_backend
 from mjcartpole.versions import version_of
 
 PACKAGES: Final = (

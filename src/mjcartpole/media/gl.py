@@ -2,8 +2,8 @@
 
 MuJoCo draws into any OpenGL context that is current, and `mujoco.egl` or `mujoco.osmesa` make one
 without a screen, whatever `MUJOCO_GL` said when mujoco was imported. So nothing has to be set
-before that import; what has to be avoided is trying a backend that does not work (`trial.py`), and
-one that does not go with what this process has done before:
+before that import; what has to be avoided is trying a backend that does not work (see
+`backend_probe.py`), and one that does not go with what this process has done before:
 
 - PyOpenGL settles on one platform at its first import and cannot be talked out of it, unless that
   platform is not there, so that nothing can have been done with it;
@@ -24,11 +24,11 @@ from types import ModuleType
 from typing import Final, Protocol, get_args
 
 from mjcartpole.errors import RenderError
-from mjcartpole.media import trial
-from mjcartpole.media.trial import PLATFORM_VARIABLE, try_backend
+from mjcartpole.media import backend_probe
+from mjcartpole.media.backend_probe import PLATFORM_VARIABLE, try_backend
 from mjcartpole.media.turns import end_drawing
 
-Backend = trial.Backend
+Backend = backend_probe.Backend
 
 VARIABLE: Final = "MUJOCO_GL"
 """The environment variable by which MuJoCo's users choose; it is left as it was found."""

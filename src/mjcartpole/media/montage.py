@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from mjcartpole.errors import RenderError
-from mjcartpole.media.lettering import FAINT, INK, PAPER, Colour, Lettering, Pixels
+from mjcartpole.media.text import FAINT, INK, PAPER, Colour, Lettering, Pixels
 
 _LINE: Final[Colour] = (205, 210, 217)
 _SEPARATOR: Final = 2

@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
-from mjcartpole.media.fan import Wedge
+from mjcartpole.media.angle_limits import Wedge
 from mjcartpole.media.scene import Scene
 from mjcartpole.media.view import Points, View, unit
 

@@ -12,9 +12,9 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from mjcartpole.errors import RenderError
-from mjcartpole.media.lettering import Colour, Pixels
+from mjcartpole.media.hud import ACTION, Moment, Strip
 from mjcartpole.media.scene import Box, Scene
-from mjcartpole.media.strip import ACTION, Moment, Strip
+from mjcartpole.media.text import Colour, Pixels
 
 _SHORTEST_ARROW: Final = 14
 _MOST_ARROWS: Final = 100

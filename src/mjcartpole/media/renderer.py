@@ -10,12 +10,12 @@ from PIL import Image
 
 from mjcartpole.errors import RenderError
 from mjcartpole.media import gl
+from mjcartpole.media.backend_probe import Backend
 from mjcartpole.media.quality import DEFAULT_QUALITY, Quality
 from mjcartpole.media.scene import DEFAULT_CAMERA, Box, Scene
 from mjcartpole.media.sketch import SketchRenderer
-from mjcartpole.media.trial import Backend
 from mjcartpole.media.turns import TakesTurns, drawing
-from mjcartpole.physics.model import CartPole
+from mjcartpole.physics.load import CartPole
 
 Kind = Literal["auto", "egl", "osmesa", "glfw", "sketch"]
 """Who draws: an OpenGL backend, the sketch renderer, or the best that works here."""

@@ -16,10 +16,10 @@ import numpy.typing as npt
 
 from mjcartpole import task
 from mjcartpole.errors import RenderError
-from mjcartpole.media.fan import Fan, Wedge, box_corners
+from mjcartpole.media.angle_limits import Fan, Wedge, box_corners
 from mjcartpole.media.quality import DEFAULT_QUALITY, Quality, level_of
 from mjcartpole.media.view import Points, View
-from mjcartpole.physics.model import CartPole
+from mjcartpole.physics.load import CartPole
 from mjcartpole.physics.structure import directions
 
 Box = tuple[int, int, int, int]

@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from mjcartpole.errors import RenderError
-from mjcartpole.files import replacing
+from mjcartpole.files import atomic_write
 from mjcartpole.media.encoders import FFmpeg, find_ffmpeg, why_not_the_first
 from mjcartpole.media.h264 import even, write_mp4
 from mjcartpole.media.pictures import check_folder, replacing_folder, write_pictures
@@ -122,7 +122,7 @@ def _write(
     height, width = first.shape[:2]
     if ffmpeg is not None:
         size = _size_for_h264(width, height)
-        with replacing(target) as temporary:
+        with atomic_write(target) as temporary:
             count = write_mp4(temporary, frames, (width, height), fps, ffmpeg)
         return Video(target, count, *size, fps)
     if not suffix:
@@ -135,7 +135,7 @@ def _write(
     gif = suffix == ".gif"
     write = animation.write_gif if gif else animation.write_webp
     shown = _shown_fps(fps, animation.GIF_MOST_FPS if gif else animation.WEBP_MOST_FPS, suffix)
-    with replacing(target) as temporary:
+    with atomic_write(target) as temporary:
         count = _in_background(lambda stream: write(temporary, stream, fps), frames)
     return Video(target, count, width, height, shown)
 

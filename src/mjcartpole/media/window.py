@@ -10,9 +10,9 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
+from mjcartpole.media.backend_probe import try_backend
 from mjcartpole.media.scene import DEFAULT_CAMERA
-from mjcartpole.media.trial import try_backend
-from mjcartpole.physics.model import CartPole
+from mjcartpole.physics.load import CartPole
 
 _PATIENCE = 5.0
 """Seconds to wait for the viewer's thread."""

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Final
 
 from mjcartpole.errors import ModelError, ModelNotFoundError
-from mjcartpole.physics.document import Document, Element
+from mjcartpole.physics.edit.document import Document, Element
 
 MODEL: Final = "model"
 

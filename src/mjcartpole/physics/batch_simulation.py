@@ -13,7 +13,7 @@ from mujoco import batch as mujoco_batch
 
 from mjcartpole.errors import ConfigError, SimulationError
 from mjcartpole.integrator import Integrator, check_integrator
-from mjcartpole.physics.model import CartPole
+from mjcartpole.physics.load import CartPole
 from mjcartpole.physics.simulation import LARGEST_SANE, check_sane, stepping_model
 
 _SHARE: Final = 4
@@ -70,11 +70,11 @@ class BatchSimulation:
         self._moves = np.empty((n, joints))
         model = stepping_model(cartpole.model, integrator)
         self._is_remembering = _remembers_more_than_its_state(model)
-        crew = threads or _largest_crew(n, cartpole.substeps)
-        self._use(mujoco_batch.Batch(model, n, crew, self._is_remembering))
+        runner = threads or _largest_crew(n, cartpole.substeps)
+        self._use(mujoco_batch.Batch(model, n, runner, self._is_remembering))
         self._fresh = self._batch.state[0].copy()
         self._other: mujoco_batch.Batch | None = None
-        if threads is None and crew > 1 and not self._is_remembering:
+        if threads is None and runner > 1 and not self._is_remembering:
             self._other = mujoco_batch.Batch(model, n, 1)
         self._laps: collections.deque[float] = collections.deque(maxlen=_TRIAL - 2)
         self._until_choice, self._to_beat = _TRIAL, float("nan")
@@ -99,11 +99,11 @@ class BatchSimulation:
         """How many threads step at present."""
         return int(self._batch.nthread)
 
-    def put(self, ids: npt.NDArray[np.intp] | slice, states: npt.NDArray[np.float64]) -> None:
+    def set_state(self, ids: npt.NDArray[np.intp] | slice, states: npt.NDArray[np.float64]) -> None:
         """Put some cart-poles into states, one row each; nothing of their past remains."""
         if self._is_remembering:
             everyone = np.arange(len(self.state))
-            self._batch.reset(everyone[ids], stage=int(mujoco.mjtStage.mjSTAGE_NONE))
+            self._batch.reset(everyone[ids], setup=int(mujoco.mjtStage.mjSTAGE_NONE))
         else:
             # The row is all there is, and to copy it is a hundred times quicker than `reset`.
             self._batch.state[ids] = self._fresh

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Final
 import mujoco
 
 if TYPE_CHECKING:
-    from mjcartpole.physics.model import CartPole
+    from mjcartpole.physics.load import CartPole
 
 MOST: Final = 32
 """How many are kept; the oldest make room."""

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from mjcartpole.physics.equations import Parameters
-from mjcartpole.physics.model import CartPole
+from mjcartpole.physics.load import CartPole
 from mjcartpole.physics.parameters import (
     differences,
     geometry_of,

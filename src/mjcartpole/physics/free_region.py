@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from mjcartpole import task
 from mjcartpole.physics.equations import Parameters, derivative
-from mjcartpole.physics.model import CartPole
+from mjcartpole.physics.load import CartPole
 from mjcartpole.physics.parameters import is_on, joint_label, label
 from mjcartpole.physics.simulation import nothing_can_touch
 

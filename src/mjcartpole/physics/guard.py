@@ -17,7 +17,7 @@ from typing import Final
 import mujoco
 
 from mjcartpole.errors import ModelError, ModelSyntaxError, NotACartPoleError
-from mjcartpole.physics.document import Document
+from mjcartpole.physics.edit.document import Document
 from mjcartpole.physics.library import libmujoco
 
 MEMORY: Final = 768 * 2**20

@@ -14,7 +14,7 @@ import numpy as np
 from mjcartpole import task
 from mjcartpole.errors import SimulationError
 from mjcartpole.integrator import Integrator
-from mjcartpole.physics.model import CartPole
+from mjcartpole.physics.load import CartPole
 from mjcartpole.physics.simulation import Simulation, State
 
 STARTS: Final = 8
@@ -145,7 +145,7 @@ class _Search:
 
     def held(self, control: float) -> int:
         """Control steps until one action, held, ends an episode; `COARSE` + 1 if more."""
-        self.simulation.put((0.0,) * self.simulation.size)
+        self.simulation.set_state((0.0,) * self.simulation.size)
         return next(
             (n for n in range(1, COARSE + 1) if _has_ended(self.simulation.step(control))),
             COARSE + 1,
@@ -170,7 +170,7 @@ class _Search:
         Returns:
             -1 or 1, or 0 where it stays or the cart's place plays a part; and control steps.
         """
-        self.simulation.put(start)
+        self.simulation.set_state(start)
         for done in range(1, task.TIME_LIMIT + 1):
             state = self.simulation.step(control)
             self.steps += self._cost
@@ -189,14 +189,14 @@ class _Search:
 
     def _step(self, state: State, control: float) -> State:
         self.steps += self._cost
-        self.simulation.put(state)
+        self.simulation.set_state(state)
         return self.simulation.step(control)
 
 
 def _has_ended(state: State) -> bool:
-    return task.has_terminated(state[0], task.farthest(state[2::2]))
+    return task.has_terminated(state[0], task.max_abs(state[2::2]))
 
 
 def _danger(state: State) -> float:
     """How far the pole that leans most will lean in a moment."""
-    return task.farthest([a + 0.25 * b for a, b in zip(state[2::2], state[3::2], strict=True)])
+    return task.max_abs([a + 0.25 * b for a, b in zip(state[2::2], state[3::2], strict=True)])

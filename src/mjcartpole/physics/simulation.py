@@ -10,7 +10,7 @@ import numpy.typing as npt
 from mjcartpole import task
 from mjcartpole.errors import ConfigError, SimulationError
 from mjcartpole.integrator import Integrator, check_integrator
-from mjcartpole.physics.model import CartPole
+from mjcartpole.physics.load import CartPole
 
 State = tuple[float, ...]
 """`(x, x_dot, theta, theta_dot)`: m, m/s, rad, rad/s; two more values for each further pole."""
@@ -86,9 +86,9 @@ class Simulation:
             raise ConfigError(
                 f"a state has {self.size} values ({names}), not the shape {values.shape}"
             )
-        self.put(values.tolist())
+        self.set_state(values.tolist())
 
-    def put(self, state: Sequence[float]) -> None:
+    def set_state(self, state: Sequence[float]) -> None:
         """Put the cart-pole into a state given as plain floats, as the `state` setter does."""
         # Where steps were timed, mj_resetData words a report of the timers, as slowly as two
         # steps, for a log that is off. It clears the timers in any case.
@@ -266,7 +266,7 @@ def as_one_pole(step: Callable[[float], State]) -> Callable[[float], State]:
 
     def advance(control: float) -> State:
         state = step(control)
-        return state[0], state[1], task.farthest(state[2::2]), task.farthest(state[3::2])
+        return state[0], state[1], task.max_abs(state[2::2]), task.max_abs(state[3::2])
 
     return advance
 

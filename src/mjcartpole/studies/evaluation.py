@@ -18,7 +18,7 @@ from mjcartpole.learning.loop import play_episode
 from mjcartpole.learning.policy import Policy
 
 if TYPE_CHECKING:
-    from mjcartpole.physics.model import ModelLike
+    from mjcartpole.physics.load import ModelLike
 
 EPISODES: Final = 100
 SEED: Final = 1_000_000
@@ -111,7 +111,7 @@ def evaluate(
     check_count(episodes, seed)
     check_backend(backend, model, integrator)
     if backend == "mujoco":
-        from mjcartpole.physics.model import load_model  # noqa: PLC0415 - it imports MuJoCo
+        from mjcartpole.physics.load import load_model  # noqa: PLC0415 - it imports MuJoCo
 
         model = load_model(model)
         engine, poles, name = choose_engine(engine, backend, model), model.poles, model.name

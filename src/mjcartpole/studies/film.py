@@ -15,6 +15,7 @@ from mjcartpole.integrator import Integrator
 from mjcartpole.learning.episodes import Episode
 from mjcartpole.learning.loop import play_episode
 from mjcartpole.learning.policy import Policy
+from mjcartpole.media.hud import Moment
 from mjcartpole.media.montage import (
     equally_spaced,
     last_seconds,
@@ -28,9 +29,8 @@ from mjcartpole.media.overlay import Overlay
 from mjcartpole.media.quality import DEFAULT_QUALITY, Quality
 from mjcartpole.media.renderer import DEFAULT_HEIGHT, DEFAULT_WIDTH, Renderer, open_renderer
 from mjcartpole.media.scene import DEFAULT_CAMERA, check_picture
-from mjcartpole.media.strip import Moment
 from mjcartpole.media.video import DEFAULT_FPS
-from mjcartpole.physics.model import CartPole, ModelLike, load_model
+from mjcartpole.physics.load import CartPole, ModelLike, load_model
 from mjcartpole.studies.evaluation import SEED, check_count
 from mjcartpole.task import CONTROL_STEP, N_ACTIONS
 
@@ -50,7 +50,7 @@ Frame = npt.NDArray[np.uint8]
 
 
 @dataclass(frozen=True)
-class Stage:
+class PolicySetup:
     """A policy and where it is played.
 
     Attributes:
@@ -76,7 +76,7 @@ class Stage:
 
 
 @dataclass(frozen=True)
-class Look:
+class VideoOptions:
     """How a film looks.
 
     Attributes:
@@ -136,7 +136,7 @@ class Look:
 
 
 @dataclass(frozen=True, eq=False)
-class Take:
+class Rollout:
     """One episode as it was played.
 
     Attributes:
@@ -145,17 +145,17 @@ class Take:
         states: From the first to the last, one row each, shape (steps + 1, 4) with one pole.
     """
 
-    stage: Stage
+    setup: PolicySetup
     episode: Episode
     states: npt.NDArray[np.float64] = field(repr=False)
 
-    def places(self, look: Look) -> npt.NDArray[np.float64]:
+    def places(self, look: VideoOptions) -> npt.NDArray[np.float64]:
         """Where in the episode each frame of a film lies, in control steps."""
-        return look.places(len(self.states), self.stage.cartpole.control_step)
+        return look.places(len(self.states), self.setup.cartpole.control_step)
 
     def moment(self, place: float) -> Moment:
         """What an overlay says at a place between control steps."""
-        step, policy = int(place + _ROUNDING), self.stage.policy
+        step, policy = int(place + _ROUNDING), self.setup.policy
         state = state_at(self.states, place)
         if step >= self.episode.steps:
             return Moment(self.episode.steps, self.episode.total, state)
@@ -165,7 +165,7 @@ class Take:
         return Moment(step, float(step), state, policy(observation), (left, right))
 
 
-def play(stage: Stage, episodes: int = 1) -> list[Take]:
+def play(setup: PolicySetup, episodes: int = 1) -> list[Rollout]:
     """Play the first episodes that an evaluation with the same seed plays.
 
     Raises:
@@ -173,14 +173,14 @@ def play(stage: Stage, episodes: int = 1) -> list[Take]:
             for another number of poles.
         SimulationError: The physics diverged.
     """
-    check_count(episodes, stage.seed)
-    stage.policy.check_fits(stage.cartpole.poles, stage.cartpole.name)
+    check_count(episodes, setup.seed)
+    setup.policy.check_fits(setup.cartpole.poles, setup.cartpole.name)
     takes = []
-    with contextlib.closing(make_env(stage.backend, stage.model, stage.integrator)) as env:
+    with contextlib.closing(make_env(setup.backend, setup.model, setup.integrator)) as env:
         for number in range(episodes):
-            seed = stage.seed if number == 0 else None
-            episode, states = play_episode(env, stage.policy, number=number, seed=seed)
-            takes.append(Take(stage, episode, np.array(states)))
+            seed = setup.seed if number == 0 else None
+            episode, states = play_episode(env, setup.policy, number=number, seed=seed)
+            takes.append(Rollout(setup, episode, np.array(states)))
     return takes
 
 
@@ -192,7 +192,7 @@ class Film:
         drawn_by: Which renderer draws.
     """
 
-    def __init__(self, casts: Sequence[Sequence[Take]], look: Look) -> None:
+    def __init__(self, casts: Sequence[Sequence[Rollout]], look: VideoOptions) -> None:
         """Open a renderer for each stage; several are shown side by side.
 
         Args:
@@ -207,7 +207,7 @@ class Film:
         self._look = look
         with contextlib.ExitStack() as opened:
             self._renderers = [
-                opened.enter_context(_open_renderer(takes[0].stage.cartpole, look))
+                opened.enter_context(_open_renderer(takes[0].setup.cartpole, look))
                 for takes in casts
             ]
             self._open = opened.pop_all()
@@ -224,7 +224,7 @@ class Film:
 
     def frames(self) -> Iterator[Frame]:
         """Draw it, one frame at a time; an array may be used again for the next one."""
-        labels = [takes[0].stage.name for takes in self._casts]
+        labels = [takes[0].setup.name for takes in self._casts]
         for takes in zip(*self._casts, strict=True):
             streams = [self._draw(*pair) for pair in zip(takes, self._renderers, strict=True)]
             yield from streams[0] if len(streams) == 1 else side_by_side(streams, labels)
@@ -232,16 +232,16 @@ class Film:
     def contact_sheet(self, count: int) -> Frame:
         """Equally spaced moments of the first stage's first episode, as one picture."""
         take, renderer = self._casts[0][0], self._renderers[0]
-        places, control_step = take.places(self._look), take.stage.cartpole.control_step
+        places, control_step = take.places(self._look), take.setup.cartpole.control_step
         chosen = [float(places[index]) for index in equally_spaced(len(places), count)]
         frames = [frame.copy() for frame in self._draw_places(take, renderer, chosen)]
         return sheet(frames, [time_label(place, control_step) for place in chosen])
 
-    def _draw(self, take: Take, renderer: Renderer) -> Iterator[Frame]:
+    def _draw(self, take: Rollout, renderer: Renderer) -> Iterator[Frame]:
         return self._draw_places(take, renderer, take.places(self._look))
 
     def _draw_places(
-        self, take: Take, renderer: Renderer, places: Sequence[float] | npt.NDArray[np.float64]
+        self, take: Rollout, renderer: Renderer, places: Sequence[float] | npt.NDArray[np.float64]
     ) -> Iterator[Frame]:
         overlay = Overlay(renderer.scene) if self._look.overlay else None
         for place in places:
@@ -249,7 +249,7 @@ class Film:
             yield frame if overlay is None else overlay.draw(frame, take.moment(place))
 
 
-def _open_renderer(cartpole: CartPole, look: Look) -> Renderer:
+def _open_renderer(cartpole: CartPole, look: VideoOptions) -> Renderer:
     look.check(cartpole)
     return open_renderer(
         cartpole, width=look.width, height=look.height, camera=look.camera, quality=look.quality

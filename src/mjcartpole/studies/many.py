@@ -6,8 +6,8 @@ from pathlib import Path
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.engine import Engine
 from mjcartpole.learning.run_model import check_storable
-from mjcartpole.studies import seed_runs
-from mjcartpole.studies.seeds import Crew, ManyResult, SeedResult
+from mjcartpole.studies import multi_seed_runs
+from mjcartpole.studies.multi_seed import ManyResult, SeedResult, SeedRunner
 
 
 def train_many(
@@ -45,16 +45,16 @@ def train_many(
     cartpole = config.load_model()
     config.discretizer(cartpole.poles)
     if run_dir is None:
-        crew = Crew(config, seeds, cartpole, workers=workers, engine=engine)
-        return _finished(crew, crew.run(_never))
+        runner = SeedRunner(config, seeds, cartpole, workers=workers, engine=engine)
+        return _finished(runner, runner.run(_never))
     check_storable(cartpole)
-    crew = Crew(
+    runner = SeedRunner(
         config, seeds, cartpole, workers=workers, engine=engine, folder=run_dir, preset="custom"
     )
-    with seed_runs.claimed_seeds(run_dir, overwrite=overwrite):
-        seed_runs.begin_seeds(run_dir, config, crew.seeds, cartpole, preset="custom")
-        many = _finished(crew, crew.run(_never))
-        seed_runs.write_seeds(run_dir, many)
+    with multi_seed_runs.claimed_seeds(run_dir, overwrite=overwrite):
+        multi_seed_runs.begin_seeds(run_dir, config, runner.seeds, cartpole, preset="custom")
+        many = _finished(runner, runner.run(_never))
+        multi_seed_runs.write_seeds(run_dir, many)
     return many
 
 
@@ -62,7 +62,7 @@ def _never() -> bool:
     return False
 
 
-def _finished(crew: Crew, work: Iterator[SeedResult | None]) -> ManyResult:
+def _finished(runner: SeedRunner, work: Iterator[SeedResult | None]) -> ManyResult:
     for _ in work:
         pass
-    return crew.result()
+    return runner.result()

@@ -13,8 +13,8 @@ from mjcartpole import task
 from mjcartpole.errors import ConfigError
 from mjcartpole.integrator import Integrator
 from mjcartpole.learning.policy import Policy
-from mjcartpole.physics.edit import edits_of
-from mjcartpole.physics.model import Edits, ModelLike, load_model
+from mjcartpole.physics.edit.edits import edits_of
+from mjcartpole.physics.load import Edits, ModelLike, load_model
 from mjcartpole.studies.evaluation import EPISODES, SEED, check_count
 from mjcartpole.studies.transfer import GYM, Cell, TransferResult, find_place, transfer
 

@@ -4,8 +4,8 @@ Two questions are kept apart. `cartpole-v1`: is this model CartPole-v1? `itself`
 this model as the analytic pole with the model's own parameters moves?
 """
 
+from mjcartpole.studies.parity.case import Against, Subject
 from mjcartpole.studies.parity.ladder import RUNGS, run_ladder
 from mjcartpole.studies.parity.result import Figure, Result
-from mjcartpole.studies.parity.subject import Against, Subject
 
 __all__ = ["RUNGS", "Against", "Figure", "Result", "Subject", "run_ladder"]

@@ -9,11 +9,11 @@ from mjcartpole.integrator import Integrator
 from mjcartpole.physics import equations
 from mjcartpole.physics.equations import coefficients
 from mjcartpole.physics.free_region import FreeRegion
-from mjcartpole.physics.model import with_options
+from mjcartpole.physics.load import with_options
 from mjcartpole.physics.simulation import Simulation
+from mjcartpole.studies.parity.case import Subject, Vector
 from mjcartpole.studies.parity.dynamics import beyond_result
 from mjcartpole.studies.parity.result import Figure, Result
-from mjcartpole.studies.parity.subject import Subject, Vector
 
 METHODS: dict[str, tuple[Integrator, str, int]] = {
     "explicit Euler": ("gym", "Euler", 1),

@@ -13,7 +13,7 @@ import numpy as np
 
 from mjcartpole.physics.equations import Parameters
 from mjcartpole.physics.parameters import differences, take
-from mjcartpole.studies.parity.subject import Subject, Vector
+from mjcartpole.studies.parity.case import Subject, Vector
 
 Predict: TypeAlias = Callable[[Parameters], Vector]
 """What a cart-pole with such parameters would give, of the shape of what was measured."""

@@ -14,9 +14,9 @@ from mjcartpole.physics.dry_friction import DryFriction
 from mjcartpole.physics.equations import Parameters, coefficients
 from mjcartpole.physics.file_steps import file_step
 from mjcartpole.physics.free_region import WIDE_BOX
+from mjcartpole.studies.parity.case import Against, Batch, Subject, Vector
 from mjcartpole.studies.parity.diagnosis import Predict, likely_cause
 from mjcartpole.studies.parity.result import Figure, Result
-from mjcartpole.studies.parity.subject import Against, Batch, Subject, Vector
 
 LEAST_ARM = 1e-9
 """Metres."""

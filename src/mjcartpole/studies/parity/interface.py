@@ -8,8 +8,8 @@ import numpy as np
 from mjcartpole import task
 from mjcartpole.envs.backend import GYM_ID
 from mjcartpole.envs.registration import ENV_ID
+from mjcartpole.studies.parity.case import Subject
 from mjcartpole.studies.parity.result import Figure, Result
-from mjcartpole.studies.parity.subject import Subject
 
 BOUNDS: tuple[dict[str, float], ...] = (
     {},

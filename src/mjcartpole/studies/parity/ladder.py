@@ -3,15 +3,15 @@
 from collections.abc import Callable, Iterator, Sequence
 
 from mjcartpole.errors import ConfigError
+from mjcartpole.studies.parity.case import Subject
 from mjcartpole.studies.parity.convergence import convergence
 from mjcartpole.studies.parity.dynamics import accelerations, step_gym, step_mujoco
+from mjcartpole.studies.parity.engine_check import dm_control
 from mjcartpole.studies.parity.interface import interface
 from mjcartpole.studies.parity.learning import learning
 from mjcartpole.studies.parity.result import Result
 from mjcartpole.studies.parity.rules import boundaries
-from mjcartpole.studies.parity.subject import Subject
 from mjcartpole.studies.parity.trajectories import closed_loop, horizon
-from mjcartpole.studies.parity.witness import dm_control
 
 RUNGS: dict[int, Callable[[Subject], Result]] = {
     1: interface,

@@ -12,9 +12,9 @@ from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.loop import play_episode
 from mjcartpole.learning.training import Training
 from mjcartpole.studies.evaluation import SEED
+from mjcartpole.studies.parity.case import Subject, Vector
 from mjcartpole.studies.parity.dynamics import beyond_result
 from mjcartpole.studies.parity.result import Figure, Result
-from mjcartpole.studies.parity.subject import Subject, Vector
 
 SEEDS: Final = 20
 BLOCKS: Final = 10

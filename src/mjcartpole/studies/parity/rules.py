@@ -11,8 +11,8 @@ import numpy as np
 
 from mjcartpole import task
 from mjcartpole.envs.backend import GYM_ID
+from mjcartpole.studies.parity.case import Subject
 from mjcartpole.studies.parity.result import Figure, Result
-from mjcartpole.studies.parity.subject import Subject
 
 LIMITS = ((0, task.X_LIMIT), (2, task.THETA_LIMIT))
 STEPS_BEYOND_THE_END = 4

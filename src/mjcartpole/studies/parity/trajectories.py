@@ -10,9 +10,9 @@ from scipy import stats
 
 from mjcartpole.learning.episodes import ENDINGS, ending_index
 from mjcartpole.physics import equations, linear
+from mjcartpole.studies.parity.case import Batch, Subject, Vector
 from mjcartpole.studies.parity.dynamics import EPS, LEAST_ARM, STEP_BOUNDS, beyond_result, step_unit
 from mjcartpole.studies.parity.result import Figure, Result
-from mjcartpole.studies.parity.subject import Batch, Subject, Vector
 
 HORIZON = 400
 

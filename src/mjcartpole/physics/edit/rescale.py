@@ -1,0 +1,333 @@
+"""Other masses and another length of the pole, written into the elements that decide them.
+
+What an <inertial> says is written there; where MuJoCo computes masses from geoms, the geoms change
+and MuJoCo computes again.
+"""
+
+import math
+from collections.abc import Sequence
+from fractions import Fraction
+from typing import Final
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+
+from mjcartpole.errors import ConfigError
+from mjcartpole.physics.bodies import cart_bodies, mass_of, pole_bodies
+from mjcartpole.physics.edit.document import Document, Element
+from mjcartpole.physics.edit.xml_elements import Parts, numbers_of
+from mjcartpole.physics.load import CartPole
+from mjcartpole.physics.parameters import pole_of
+
+Vector = npt.NDArray[np.float64]
+
+_AS_WRITTEN: Final = 1e-5
+"""An inertia this close, relative, to a uniform rod's is one, written with fewer digits."""
+
+_TURNED: Final = {"quat", "euler", "axisangle", "xyaxes", "zaxis", "fullinertia"}
+_LONG: Final = (mujoco.mjtGeom.mjGEOM_CAPSULE, mujoco.mjtGeom.mjGEOM_CYLINDER)
+
+
+# --- mass ---------------------------------------------------------------------------------------
+
+
+def set_cart_mass(parts: Parts, cartpole: CartPole, mass: float) -> None:
+    """Give the cart another mass; the inertia of what only slides has no effect and stays.
+
+    Raises:
+        ConfigError: There is nothing to scale.
+    """
+    _set_mass(parts, cartpole.model, cart_bodies(cartpole), "cart", mass)
+
+
+def set_pole_mass(parts: Parts, cartpole: CartPole, mass: float, pole: int = 0) -> None:
+    """Give a pole another mass, with the inertia that follows.
+
+    Raises:
+        ConfigError: There is nothing to scale.
+    """
+    model, bodies = cartpole.model, pole_bodies(cartpole, pole)
+    rod = _RodInertial.of(parts, cartpole, pole)
+    alone = len([body for body in bodies if model.body_mass[body] > 0]) == 1
+    ratio = _ratio(mass, mass_of(model, bodies))
+    for body in bodies:
+        inertial = parts.inertial(model, body)
+        if inertial is None or (rod is not None and body == bodies[0]):
+            continue
+        for name in ("diaginertia", "fullinertia"):
+            if name in inertial.attributes:
+                parts.put(inertial, name, [ratio * value for value in numbers_of(inertial, name)])
+    if rod is not None:
+        rod.write(mass if alone else ratio * rod.mass, rod.length)
+    _set_mass(parts, model, bodies, "pole", mass)
+
+
+def _ratio(new: float, old: float) -> float:
+    """New by old; 1 where only rounding is between them, so that an edit made twice is one."""
+    return 1.0 if math.isclose(new, old, rel_tol=1e-14) else new / max(old, mujoco.mjMINVAL)
+
+
+def _set_mass(
+    parts: Parts, model: mujoco.MjModel, bodies: list[int], what: str, mass: float
+) -> None:
+    """Scale the masses of bodies to a sum."""
+    heavy = [body for body in bodies if model.body_mass[body] > 0]
+    if not heavy:
+        raise ConfigError(f"{what}.mass cannot be set: no body of the {what} has a mass to scale")
+    ratio = _ratio(mass, float(sum(float(model.body_mass[body]) for body in heavy)))
+    for body in heavy:
+        inertial = parts.inertial(model, body)
+        if inertial is None:
+            _scale_geoms(parts, model, body, ratio)
+        elif len(heavy) == 1:
+            parts.put(inertial, "mass", [mass])
+        else:
+            parts.put(inertial, "mass", [ratio * float(model.body_mass[body])])
+
+
+def _scale_geoms(parts: Parts, model: mujoco.MjModel, body: int, ratio: float) -> None:
+    if ratio == 1:
+        return
+    spec = parts.spec()
+    effective = [geom for each in spec.bodies for geom in each.geoms]
+    for index, element in parts.geoms(model, body):
+        geom = effective[index]
+        if math.isnan(geom.mass):
+            parts.put(element, "density", [ratio * float(geom.density)])
+        elif geom.mass > 0:
+            parts.put(element, "mass", [ratio * float(geom.mass)])
+
+
+# --- length -------------------------------------------------------------------------------------
+
+
+class _RodInertial:
+    """An <inertial> that is a uniform thin rod from the hinge, along an axis of its body.
+
+    Attributes:
+        mass: kg.
+        length: m, hinge to tip.
+    """
+
+    def __init__(
+        self, parts: Parts, element: Element, foot: Vector, com: Vector, mass: float, axis: int
+    ) -> None:
+        self.mass, self.length = mass, 2 * abs(float(com[axis]))
+        self._parts, self._element, self._axis = parts, element, axis
+        self._foot, self._side = foot, math.copysign(1.0, com[axis])
+
+    @classmethod
+    def of(cls, parts: Parts, cartpole: CartPole, pole: int) -> "_RodInertial | None":
+        """A pole's own; None if it has none, or is no such rod."""
+        model, hinge = cartpole.model, cartpole.hinges[pole]
+        root = int(model.jnt_bodyid[hinge])
+        element = parts.inertial(model, root)
+        if element is None or _TURNED & set(element.attributes):
+            return None
+        foot = np.array(model.jnt_pos[hinge])
+        com, mass = np.array(numbers_of(element, "pos")) - foot, float(model.body_mass[root])
+        axis = int(np.abs(com).argmax())
+        if com[axis] == 0:
+            return None
+        inertia = np.delete(numbers_of(element, "diaginertia"), axis)
+        straight = np.abs(np.delete(com, axis)).max() <= 1e-12 * abs(com[axis])
+        rods = mass * com[axis] ** 2 / 3
+        uniform = rods > 0 and np.abs(inertia - rods).max() < _AS_WRITTEN * rods
+        return cls(parts, element, foot, com, mass, axis) if straight and uniform else None
+
+    def write(self, mass: float, length: float) -> None:
+        """Give the rod another mass and length; its thickness stays."""
+        pos, inertia = numbers_of(self._element, "pos"), numbers_of(self._element, "diaginertia")
+        across, axis = uniform_rod_inertia(mass, length), self._axis
+        along = inertia[axis]
+        if mass != self.mass:
+            along = float(f"{along * (mass / self.mass):.12g}")  # nothing turns it: no noise
+        inertia = [across] * 3
+        inertia[axis] = min(along, across)  # for a pole thicker than long
+        pos[axis] = float(self._foot[axis]) + self._side * length / 2
+        self._parts.put(self._element, "pos", pos)
+        self._parts.put(self._element, "mass", [mass])
+        self._parts.put(self._element, "diaginertia", inertia)
+
+
+def uniform_rod_inertia(mass: float, length: float) -> float:
+    """M L^2 / 12, kg m^2, of the numbers as they are written: 0.2 * 1.5^2 / 12 gives 0.0375.
+
+    Plain floats would leave noise in the last digits, in a file that people read.
+    """
+    try:
+        return float(Fraction(repr(mass)) * Fraction(repr(length)) ** 2 / 12)
+    except OverflowError:
+        return math.inf
+
+
+def set_length(parts: Parts, cartpole: CartPole, length: float, pole: int = 0) -> float:
+    """Give a pole another length, hinge to tip: everything on it moves along.
+
+    Bodies that are fixed to the pole, and poles that stand on it, keep their shape and move.
+
+    Returns:
+        How many times longer it is than it was.
+
+    Raises:
+        ConfigError: The pole cannot be stretched; the reason is said.
+    """
+    model, root = cartpole.model, int(cartpole.model.jnt_bodyid[cartpole.hinges[pole]])
+    rod, stretch = _measured(parts, cartpole, pole)
+    stretch.new = length
+    inertial = parts.inertial(model, root)
+    if rod is not None:
+        rod.write(rod.mass, length)
+    elif inertial is not None:
+        stretch.inertial(inertial)
+    stretch.geoms()
+    for tag in ("site", "body", "camera", "light"):
+        for element in parts.body(model, root).find(tag):
+            if element.parent is not None and element.parent.tag == "frame":
+                raise ConfigError("pole.length cannot be set: the pole has a <frame>")
+            if "pos" in element.attributes:
+                parts.put(element, "pos", stretch.point(numbers_of(element, "pos")))
+    return stretch.new / stretch.old
+
+
+def length_of(cartpole: CartPole, pole: int = 0) -> float:
+    """A pole's length, hinge to tip, m, as `set_length` has it.
+
+    Raises:
+        ConfigError: The document does not show it; the reason is said.
+    """
+    return _measured(Parts(Document(cartpole.xml)), cartpole, pole)[1].old
+
+
+def _measured(
+    parts: Parts, cartpole: CartPole, pole: int
+) -> "tuple[_RodInertial | None, _Stretch]":
+    """A pole's rod, if it is one, and a stretch that knows how long the pole is."""
+    model, hinge = cartpole.model, cartpole.hinges[pole]
+    root, com = int(model.jnt_bodyid[hinge]), pole_of(cartpole, pole).com
+    rod, stretch = _RodInertial.of(parts, cartpole, pole), _Stretch(parts, model, hinge, com, root)
+    stretch.old = rod.length if rod else stretch.reach()
+    return rod, stretch
+
+
+class _Stretch:
+    """From one length to another, along the pole and from the hinge."""
+
+    def __init__(
+        self, parts: Parts, model: mujoco.MjModel, hinge: int, com: Vector, root: int
+    ) -> None:
+        distance = float(np.linalg.norm(com))
+        if distance < 1e-9:
+            raise ConfigError(
+                "pole.length cannot be set: the pole's centre of mass is at the hinge, so it has "
+                "no direction"
+            )
+        self.parts, self.model, self.root = parts, model, root
+        self.foot = np.array(model.jnt_pos[hinge])
+        along = com / distance
+        axis = int(np.abs(along).argmax())
+        self.axis = axis if abs(along[axis]) > 1 - 1e-15 else None
+        self.along = np.eye(3)[axis] * np.sign(along[axis]) if self.axis is not None else along
+        spec = parts.spec()
+        self._effective = [geom for body in spec.bodies for geom in body.geoms]
+        self.old = self.new = 1.0
+
+    def value(self, old: float) -> float:
+        """A distance along the pole; its tip and its middle come out without rounding."""
+        for share in (1.0, 0.5):
+            if math.isclose(abs(old), share * self.old, rel_tol=1e-12):
+                return math.copysign(share * self.new, old)
+        return old * _ratio(self.new, self.old)
+
+    def point(self, point: Sequence[float]) -> list[float]:
+        """A point in the frame of the pole's body."""
+        arm = np.array(point) - self.foot
+        if self.axis is not None:
+            moved = list(point)
+            moved[self.axis] = float(self.foot[self.axis]) + self.value(float(arm[self.axis]))
+            return moved
+        if np.linalg.norm(np.cross(arm, self.along)) <= 1e-12 * np.linalg.norm(arm):
+            return [float(a) + self.value(float(b)) for a, b in zip(self.foot, arm, strict=True)]
+        return [
+            float(x)
+            for x in point + (_ratio(self.new, self.old) - 1) * (arm @ self.along) * self.along
+        ]
+
+    def reach(self) -> float:
+        """How far the pole reaches from the hinge: the axes of its geoms, without round ends."""
+        reached = [0.0]
+        for index, element in self.parts.geoms(self.model, self.root):
+            ends = self._ends(index, element)
+            reached.extend(float((np.array(end) - self.foot) @ self.along) for end in ends)
+        if max(reached) <= 0:
+            raise ConfigError("pole.length cannot be set: no geom of the pole shows its length")
+        return max(reached)
+
+    def inertial(self, element: Element) -> None:
+        """Any mass distribution along the pole: inertia goes with the length squared."""
+        if self.axis is None or _TURNED & set(element.attributes):
+            raise ConfigError(
+                "pole.length cannot be set: the pole's <inertial> is turned or beside its axis; "
+                "edit it by element"
+            )
+        ratio = _ratio(self.new, self.old) * _ratio(self.new, self.old)
+        inertia = [value * ratio for value in numbers_of(element, "diaginertia")]
+        inertia[self.axis] /= ratio
+        self.parts.put(element, "pos", self.point(numbers_of(element, "pos")))
+        self.parts.put(element, "diaginertia", inertia)
+
+    def geoms(self) -> None:
+        """Stretch what lies along the pole, move the rest."""
+        for index, element in self.parts.geoms(self.model, self.root):
+            fromto = self._fromto(index)
+            if fromto is not None:
+                ends = [*self.point(fromto[:3]), *self.point(fromto[3:])]
+                if ends != fromto:
+                    self.parts.put(element, "fromto", ends)
+                continue
+            self._resize(index, element)
+            pos = [float(value) for value in self._spec(index).pos]
+            moved = self.point(pos)
+            if moved != pos:
+                self.parts.put(element, "pos", moved)
+
+    def _resize(self, index: int, element: Element) -> None:
+        model, size = self.model, [float(value) for value in self._spec(index).size]
+        kind = int(model.geom_type[index])
+        turn = np.empty(9)
+        mujoco.mju_quat2Mat(turn, model.geom_quat[index])
+        parallel = np.abs(turn.reshape(3, 3).T @ self.along)
+        side = int(parallel.argmax())
+        if kind == mujoco.mjtGeom.mjGEOM_SPHERE:
+            return
+        if kind in _LONG:
+            if side == 2 and parallel[2] > 1 - 1e-9:
+                self.parts.put(element, "size", [size[0], self.value(size[1])])
+        elif kind in {mujoco.mjtGeom.mjGEOM_BOX, mujoco.mjtGeom.mjGEOM_ELLIPSOID}:
+            if parallel[side] > 1 - 1e-9:
+                size[side] = self.value(size[side])
+                self.parts.put(element, "size", size)
+        else:
+            raise ConfigError("pole.length cannot be set: a mesh of the pole cannot be stretched")
+
+    def _ends(self, index: int, element: Element) -> list[list[float]]:
+        fromto = self._fromto(index)
+        if fromto is not None:
+            return [fromto[:3], fromto[3:]]
+        model, kind = self.model, int(self.model.geom_type[index])
+        turn = np.empty(9)
+        mujoco.mju_quat2Mat(turn, model.geom_quat[index])
+        half = [0.0, 0.0, float(model.geom_size[index, 1])]
+        if kind not in _LONG:
+            half = [float(value) for value in model.geom_size[index]]
+        arm = np.abs(turn.reshape(3, 3).T @ self.along) @ np.array(half) * self.along
+        return [list(model.geom_pos[index] - arm), list(model.geom_pos[index] + arm)]
+
+    def _fromto(self, index: int) -> list[float] | None:
+        values = [float(value) for value in self._spec(index).fromto]
+        return None if math.isnan(values[0]) else values
+
+    def _spec(self, index: int) -> mujoco.MjsGeom:
+        """A geom as the document has it, defaults included."""
+        return self._effective[index]

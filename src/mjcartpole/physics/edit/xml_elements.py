@@ -1,0 +1,122 @@
+"""The elements of a document that stand for parts of its compiled model, and numbers in them."""
+
+import math
+from collections.abc import Sequence
+
+import mujoco
+
+from mjcartpole.errors import ConfigError, ModelSyntaxError
+from mjcartpole.physics.edit.document import Document, Element
+from mjcartpole.physics.edit.element_path import label_of
+
+
+def number_text(value: float, written: str = "") -> str:
+    """A number as MJCF writes it, all 17 digits where needed; as it was written, if it is that."""
+    try:
+        if written and float(written) == value:
+            return written
+    except ValueError:
+        pass
+    whole = value == int(value) and abs(value) < 1e15 if math.isfinite(value) else False
+    return str(int(value)) if whole else repr(float(value))
+
+
+class Parts:
+    """The elements of a document that stand for parts of its compiled model.
+
+    Attributes:
+        document: The document; nothing may be put into it while this is in use.
+    """
+
+    def __init__(self, document: Document) -> None:
+        self.document = document
+        worlds = [child for child in document.root.children if child.tag == "worldbody"]
+        self._bodies = [each for world in worlds for each in world.walk() if each.tag == "body"]
+
+    def body(self, model: mujoco.MjModel, index: int) -> Element:
+        """The element of a body.
+
+        Raises:
+            ConfigError: The document does not write its bodies one by one.
+        """
+        names = [model.body(i).name for i in range(1, model.nbody)]
+        if [body.name for body in self._bodies] != names:
+            raise ConfigError(
+                "this cannot be edited by meaning: the document does not write every body itself "
+                "(replicate, attach, composite, include, fusestatic); edit by element"
+            )
+        return self._bodies[index - 1]
+
+    def joint(self, model: mujoco.MjModel, index: int) -> Element:
+        """The element of a joint.
+
+        Raises:
+            ConfigError: Not all joints of its body are in the document.
+        """
+        body = int(model.jnt_bodyid[index])
+        found = self.body(model, body).find("joint")
+        if len(found) != int(model.body_jntnum[body]):
+            raise ConfigError(
+                f"the joints of body {model.body(body).name!r} cannot be edited by meaning: not "
+                "all of them are in the document; edit by element"
+            )
+        return found[index - int(model.body_jntadr[body])]
+
+    def geoms(self, model: mujoco.MjModel, body: int) -> list[tuple[int, Element]]:
+        """Index and element of each geom of a body.
+
+        Raises:
+            ConfigError: Some are not written in the body.
+        """
+        elements = self.body(model, body).find("geom")
+        first = int(model.body_geomadr[body])
+        if len(elements) != int(model.body_geomnum[body]):
+            raise ConfigError(
+                f"the geoms of body '{model.body(body).name}' cannot be edited by meaning: not all "
+                "of them are in the document; edit by element"
+            )
+        return [(first + i, element) for i, element in enumerate(elements)]
+
+    def actuator(self, index: int) -> Element:
+        """The element of an actuator, by its number in the compiled model."""
+        sections = [child for child in self.document.root.children if child.tag == "actuator"]
+        return [child for section in sections for child in section.children][index]
+
+    def inertial(self, model: mujoco.MjModel, body: int) -> Element | None:
+        """The <inertial> that decides a body's mass; None where geoms do."""
+        found = self.body(model, body).find("inertial")
+        compilers = [each for each in self.document.root.children if each.tag == "compiler"]
+        said = [each.attributes.get("inertiafromgeom", "") for each in compilers]
+        from_geoms = [each for each in said if each][-1:] == ["true"]
+        return found[0] if found and not from_geoms else None
+
+    def spec(self) -> mujoco.MjSpec:
+        """The document with what defaults and classes give to each element.
+
+        Raises:
+            ModelSyntaxError: An edit has left a number that MuJoCo does not read.
+        """
+        try:
+            return mujoco.MjSpec.from_string(self.document.text)
+        except ValueError as error:
+            reason = " ".join(str(error).split())
+            raise ModelSyntaxError(f"the edited document is not a valid MJCF: {reason}") from error
+
+    def put(self, element: Element, name: str, values: Sequence[float]) -> None:
+        """Write numbers into an attribute; those that do not change keep their spelling.
+
+        Raises:
+            ConfigError: A number is too large for a computer.
+        """
+        if not all(math.isfinite(value) for value in values):
+            raise ConfigError(f"{name} of {label_of(element)} would not be finite; edit less")
+        written = element.attributes.get(name, "").split()
+        spelled = written if len(written) == len(values) else [""] * len(values)
+        tokens = [number_text(value, old) for value, old in zip(values, spelled, strict=True)]
+        if tokens != written:
+            self.document.set(element, name, " ".join(tokens))
+
+
+def numbers_of(element: Element, name: str) -> list[float]:
+    """The numbers of an attribute; three zeros where it is missing."""
+    return [float(token) for token in element.attributes.get(name, "0 0 0").split()]

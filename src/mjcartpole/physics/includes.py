@@ -1,0 +1,251 @@
+"""An MJCF is read with its includes in their place and with absolute names of its other files.
+
+MuJoCo reads `<include>` relative to the folder of the main file or of the file that includes, and
+each file once. How much memory and time a document takes is found out by a trial (see guard.py);
+here it is only seen to that reading it is no danger.
+"""
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Final
+
+from mjcartpole.errors import ModelError, ModelNotFoundError, ModelSyntaxError
+from mjcartpole.physics.assets import (
+    MODEL,
+    Asset,
+    Folders,
+    find_assets,
+    is_there,
+    name_by_content,
+    store_names,
+    strips,
+    what_else,
+    write_paths,
+)
+from mjcartpole.physics.edit.document import Document, Element
+
+LARGEST_FILE: Final = 2**24
+"""Bytes of a document, with all that it includes and attaches."""
+
+MOST_FILES: Final = 50
+"""Documents that one includes and attaches."""
+
+
+def read_text(path: Path, name: str = "", most: int = LARGEST_FILE) -> str:
+    """The text of a file.
+
+    Args:
+        path: Where it is.
+        name: What a person calls it; without one it is the model file of that path.
+        most: How many bytes it may have.
+
+    Raises:
+        ModelNotFoundError: It cannot be read, or is no regular file.
+        ModelSyntaxError: It is too large to be a document, or not text in UTF-8.
+    """
+    name = name or f"model file '{path}'"
+    if kind := what_else(path):
+        raise ModelNotFoundError(f"{name} cannot be read: '{path}' is {kind}")
+    try:
+        size = path.stat().st_size
+        with path.open("rb") as file:
+            content = file.read(most + 1)
+    except (OSError, ValueError) as error:
+        raise ModelNotFoundError(f"{name} cannot be read: {error}") from error
+    if len(content) > most:
+        raise ModelSyntaxError(
+            f"{name} has {max(size, len(content))} bytes; an MJCF is XML of some kilobytes, "
+            f"and no more than {LARGEST_FILE} bytes are read of it and all that it includes"
+        )
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise ModelSyntaxError(
+            f"{name} is not text in UTF-8 (byte {error.start} does not fit); save it as UTF-8"
+        ) from error
+
+
+def read_whole(
+    text: str, name: str, folder: Path, inside: Sequence[Path] | None = None
+) -> Document:
+    """The document with its includes in their place, and with absolute names of its other files.
+
+    Args:
+        text: As it was written. Without includes and other files it stays so to the last character.
+        name: What a person calls it.
+        folder: Where its includes and other files are.
+        inside: Folders in which all of these must lie; None: anywhere.
+
+    Raises:
+        ModelNotFoundError: A file that it includes or attaches cannot be read, or lies outside.
+        ModelSyntaxError: It is no XML, no MJCF, includes a file twice or has too many elements.
+    """
+    folders = Folders(folder.resolve(), None if inside is None else tuple(inside))
+    reader = _Reader(folders, LARGEST_FILE - len(text))
+    document, assets = reader.read(text, name)
+    _check_models(reader, assets, name)
+    write_paths(document, assets, reader.folders)
+    return document
+
+
+def portable(text: str) -> tuple[str, dict[str, Path | str]]:
+    """A document that names its files by their content, without any folder.
+
+    Args:
+        text: As `read_whole` gives it.
+
+    Returns:
+        The document, and by name the files beside it: where each is, or its text if it is a
+        document itself.
+
+    Raises:
+        ModelError: A file cannot be read.
+    """
+    reader = _Reader(Folders(Path.cwd(), None))
+    document, assets = reader.read(text, "the document")
+    files: dict[str, Path | str] = {}
+    _store(reader, document, assets, files)
+    return document.text, files
+
+
+@dataclass
+class _Reader:
+    """Reads a document and what belongs to it.
+
+    Attributes:
+        folders: Where its files are.
+        left: Bytes that may still be read.
+        included: The real paths of the files that it includes.
+    """
+
+    folders: Folders
+    left: int = LARGEST_FILE
+    included: set[str] = field(default_factory=set)
+
+    def read(self, text: str, name: str) -> tuple[Document, list[Asset]]:
+        """A document with its includes in their place, and the files that it names."""
+        text, origins = self._flat(text, name, None)
+        document = _parse(text, name)
+        root = document.root.tag
+        if root != "mujoco":
+            urdf = " (a URDF; MuJoCo can save it as MJCF)" if root == "robot" else ""
+            raise _invalid(name, f"its outermost element is <{root}>{urdf}, not <mujoco>")
+        self.folders = Folders(
+            self.folders.main, self.folders.inside, self.folders.strip or strips(document)
+        )
+        assets = find_assets(document, self.folders, origins)
+        for asset in assets:
+            called = f"'{asset.name}', which {name} names as the file of a <{asset.element.tag}>,"
+            for path in asset.tried:
+                self.folders.check(path, called)
+        return document, assets
+
+    def attached(self, asset: Asset, name: str) -> tuple[Document, list[Asset]]:
+        """A model that a document attaches, and the files that it names in turn."""
+        who = f"'{asset.name}', which {name} attaches,"
+        text = self._text(asset.path, who)
+        below = Folders(asset.path.parent, self.folders.inside, self.folders.strip)
+        reader = _Reader(below, self.left)
+        found = reader.read(text, who)
+        self.left = reader.left
+        return found
+
+    def _flat(self, text: str, name: str, origin: Path | None) -> tuple[str, list[Path | None]]:
+        """A document's text, or an included one's content, and what each element came from."""
+        document = _parse(text, name)
+        content = text.encode()
+        start, end = (0, len(content)) if origin is None else document.content(document.root)
+        pieces: list[bytes] = []
+        origins: list[Path | None] = []
+        for element in document.root.walk():
+            if element.start < start:
+                continue  # The root of an included file, or what an <include> holds.
+            if element.tag != "include":
+                origins.append(origin)
+                continue
+            inner, theirs = self._included(element, name, origin)
+            first, last = document.span(element)
+            pieces += [content[start:first], inner.encode()]
+            origins += theirs
+            start = last
+        return b"".join([*pieces, content[start:end]]).decode(), origins
+
+    def _included(
+        self, include: Element, name: str, origin: Path | None
+    ) -> tuple[str, list[Path | None]]:
+        file = include.attributes.get("file", "")
+        path = self._included_file(file, name, origin)
+        who = f"'{file}', which {name} includes,"
+        if (real := os.path.realpath(path)) in self.included:
+            raise _invalid(name, f"it includes '{file}' more than once, or in a circle")
+        self.included.add(real)
+        self.folders.check(path, who)
+        return self._flat(self._text(path, who), f"'{file}'", path.parent)
+
+    def _included_file(self, file: str, name: str, origin: Path | None) -> Path:
+        """Where an included file is: beside the main file, else beside the one that includes it."""
+        if not file:
+            raise ModelNotFoundError(
+                f"{name} cannot be read whole: an <include> of it names no file; "
+                'write <include file="..."/>'
+            )
+        file = file.replace("\\", "/")
+        usual, beside = self.folders.main / file, (origin or self.folders.main) / file
+        return usual if is_there(usual) or not is_there(beside) else beside
+
+    def _text(self, path: Path, who: str) -> str:
+        if self.left <= 0:
+            raise ModelError(
+                f"{who} is one document too many: {MOST_FILES} at most, of {LARGEST_FILE} bytes "
+                "together, are included and attached"
+            )
+        text = read_text(path, who, self.left)
+        self.left -= len(text) + LARGEST_FILE // MOST_FILES
+        return text
+
+
+def _check_models(reader: _Reader, assets: list[Asset], name: str) -> None:
+    """Look at all models that a document attaches, and at their files, each once."""
+    seen: set[str] = set()
+    waiting = [(asset, name) for asset in assets if asset.element.tag == MODEL]
+    while waiting:
+        asset, by = waiting.pop()
+        if (real := os.path.realpath(asset.path)) not in seen:
+            seen.add(real)
+            _, theirs = reader.attached(asset, by)
+            waiting += [(each, f"'{asset.name}'") for each in theirs if each.element.tag == MODEL]
+
+
+def _store(
+    reader: _Reader, document: Document, assets: list[Asset], files: dict[str, Path | str]
+) -> None:
+    names: dict[Path, str] = {}
+    for asset in assets:
+        if asset.path in names:
+            continue
+        if asset.element.tag == MODEL:
+            child, theirs = reader.attached(asset, "the document")
+            _store(reader, child, theirs, files)
+            names[asset.path] = name_by_content(asset.path, child.text)
+            files[names[asset.path]] = child.text
+        else:
+            names[asset.path] = name_by_content(asset.path)
+            files[names[asset.path]] = asset.path
+    store_names(document, assets, names)
+
+
+def _parse(text: str, name: str) -> Document:
+    if not text.strip():
+        raise _invalid(name, "it is empty")
+    if "\0" in text:
+        raise _invalid(name, "it holds a zero byte, so it is not text")
+    try:
+        return Document(text)
+    except ModelSyntaxError as error:
+        raise _invalid(name, str(error)) from error
+
+
+def _invalid(name: str, reason: str) -> ModelSyntaxError:
+    return ModelSyntaxError(f"{name} is not a valid MJCF: {reason}")

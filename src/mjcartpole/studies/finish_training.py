@@ -1,0 +1,85 @@
+"""From a training in progress to its results: written, evaluated, summarised."""
+
+import contextlib
+from pathlib import Path
+from typing import Any
+
+from mjcartpole.errors import RunError
+from mjcartpole.learning import runs, tensorboard
+from mjcartpole.learning.config import TrainConfig
+from mjcartpole.learning.documents import read_summary
+from mjcartpole.learning.engine import Engine
+from mjcartpole.learning.policy import Policy
+from mjcartpole.learning.session import Session
+from mjcartpole.learning.training import TrainResult
+from mjcartpole.physics.load import CartPole
+from mjcartpole.studies.evaluation import Evaluation, evaluate
+
+
+def finish_training(
+    session: Session, folder: Path, cartpole: CartPole, *, preset: str, events: bool = False
+) -> tuple[TrainResult, dict[str, Any], Evaluation | None]:
+    """Write what a training has come to and, if it is over, how well its policy plays.
+
+    Args:
+        session: The training, over or stopped.
+        folder: Its run folder.
+        cartpole: The model that the folder stores.
+        preset: Name of the preset that the config began from.
+        events: Write TensorBoard events as well.
+
+    Returns:
+        The result, the summary as it was written, and the evaluation; None if it is not over.
+
+    Raises:
+        FileError: The folder cannot be written.
+        SimulationError: The physics diverged.
+    """
+    result = session.training.result()
+    summary = _summary(result, preset=preset, interrupted=not session.is_over)
+    film = _film_of(folder)
+    runs.write_results(folder, result, {**summary, **film})
+    if events:
+        tensorboard.write_events(folder, result)
+    if not session.is_over:
+        return result, summary, None
+    engine = session.training.engine
+    evaluation = evaluate_where_trained(result.policy, result.config, cartpole, engine)
+    summary |= {"evaluation": evaluation.summary(), **film}
+    runs.write_summary(folder, summary)
+    return result, summary, evaluation
+
+
+def evaluate_where_trained(
+    policy: Policy, config: TrainConfig, cartpole: CartPole, engine: Engine
+) -> Evaluation:
+    """Play a greedy policy on the backend, model and integrator that it was trained on."""
+    return evaluate(
+        policy,
+        backend=config.backend,
+        model=cartpole if config.backend == "mujoco" else "cartpole",
+        integrator=config.integrator,
+        engine=engine,
+    )
+
+
+def _film_of(folder: Path) -> dict[str, Any]:
+    """The film that this training had begun when it was stopped: it keeps its name."""
+    with contextlib.suppress(RunError):
+        summary = read_summary(folder)
+        return {"video": summary["video"]} if "video" in summary else {}
+    return {}
+
+
+def _summary(result: TrainResult, *, preset: str, interrupted: bool) -> dict[str, Any]:
+    returns = result.returns
+    return {
+        "preset": preset,
+        "backend": result.config.backend,
+        "model": result.config.model,
+        "seed": result.config.seed,
+        "episodes": len(returns),
+        "interrupted": interrupted,
+        "steps": result.steps,
+        "mean_return_last_100": float(returns[-100:].mean()) if len(returns) else None,
+    }

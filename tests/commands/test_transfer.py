@@ -1,0 +1,181 @@
+"""What `transfer` prints and writes."""
+
+import csv
+import json
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from mjcartpole.commands.transfer import run_transfer
+from mjcartpole.errors import ConfigError, FileError, MjCartPoleError, RunError
+from mjcartpole.learning.config import TrainConfig
+from mjcartpole.learning.runs import begin_run, write_results
+from mjcartpole.learning.training import train
+from mjcartpole.physics.load import load_model
+
+
+@pytest.fixture(scope="module")
+def trained():
+    return [train(TrainConfig.preset("tuned", episodes=150, seed=seed)) for seed in range(4)]
+
+
+@pytest.fixture
+def policies(trained, tmp_path, monkeypatch):
+    """Four policy files where the program runs."""
+    monkeypatch.chdir(tmp_path)
+    paths = [tmp_path / f"policy-{seed}.json" for seed in range(4)]
+    for path, result in zip(paths, trained, strict=True):
+        result.policy.save(path)
+    return paths
+
+
+def read_csv(path):
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_a_matrix_is_printed_and_written(policies, tmp_path, capsys):
+    models = ["gym", "cartpole", "long"]
+    assert run_transfer(policies[:2], models=models, episodes=10, output=tmp_path / "out") == 0
+    printed = capsys.readouterr().out.splitlines()
+    assert printed[2].split() == ["policy-0", "policy-1"]
+    assert [line.split()[0] for line in printed[3:6]] == models
+    rows = read_csv(tmp_path / "out" / "transfer.csv")
+    assert [(row["policy"], row["model"]) for row in rows] == [
+        (f"policy-{seed}", model) for seed in (0, 1) for model in models
+    ]
+    document = json.loads((tmp_path / "out" / "transfer.json").read_text())
+    for row, cell in zip(rows, document["cells"], strict=True):
+        assert float(row["mean"]) == cell["mean"]
+        assert f"{cell['mean']:.1f}" in "\n".join(printed)
+    with Image.open(tmp_path / "out" / "transfer.png") as picture:
+        assert np.asarray(picture).std() > 10
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == [
+        "transfer.csv",
+        "transfer.json",
+        "transfer.png",
+    ]
+
+
+def test_the_same_seed_writes_the_same_bytes(policies, tmp_path):
+    for name in ("a", "b"):
+        run_transfer(policies[:1], models=["cartpole", "gym"], episodes=10, output=tmp_path / name)
+    for path in (tmp_path / "a").iterdir():
+        assert path.read_bytes() == (tmp_path / "b" / path.name).read_bytes()
+
+
+def test_edits_are_in_the_names(policies, tmp_path, capsys):
+    run_transfer(
+        policies[:1],
+        models=["cartpole", "gym"],
+        edits=("pole.length=1.5",),
+        episodes=2,
+        output=tmp_path / "out",
+    )
+    assert "cartpole with pole.length=1.5" in capsys.readouterr().out
+
+
+def test_a_sweep_is_printed_and_written(policies, tmp_path, capsys):
+    swept = "joint:hinge.damping=0:1:0.5"
+    assert run_transfer(policies[:2], swept=swept, episodes=10, output=tmp_path) == 0
+    printed = capsys.readouterr().out
+    assert "policy-0: the mean return is" in printed
+    rows = read_csv(tmp_path / "sweep-joint-hinge.damping.csv")
+    assert [row["value"] for row in rows] == ["0.0", "0.5", "1.0"] * 2
+    document = json.loads((tmp_path / "sweep-joint-hinge.damping.json").read_text())
+    assert document["parameter"] == "joint:hinge.damping"
+    assert document["model"] == "cartpole"
+    assert (tmp_path / "sweep-joint-hinge.damping.png").is_file()
+
+
+def test_a_run_is_swept_on_its_own_model(policies, tmp_path, trained):
+    folder = tmp_path / "runs" / "mine"
+    folder.mkdir(parents=True)
+    config = TrainConfig.preset("tuned", model="long", episodes=5)
+    begin_run(folder, config, load_model("long"), preset="tuned")
+    write_results(folder, train(config), {})
+    run_transfer([folder], swept="gravity=9:10:1", episodes=2, output=tmp_path)
+    document = json.loads((tmp_path / "sweep-gravity.json").read_text())
+    assert document["model"] == str(folder / "model.xml")
+    assert document["points"][0]["policy"] == "mine"
+
+
+def test_policies_of_one_name_are_told_apart(policies, tmp_path):
+    other = tmp_path / "other" / "policy-0.json"
+    other.parent.mkdir()
+    other.write_bytes(policies[1].read_bytes())
+    run_transfer([policies[0], other], models=["cartpole"], episodes=2, output=tmp_path)
+    document = json.loads((tmp_path / "transfer.json").read_text())
+    assert document["policies"] == [str(policies[0]), str(other)]
+
+
+def test_four_policies_on_six_models_take_less_than_a_minute(policies, tmp_path):
+    # Untrained policies would end their episodes early; these 24 cells are the slowest there are.
+    started = time.perf_counter()
+    models = ["gym", "cartpole", "long", "short", "heavy", "damped"]
+    run_transfer(policies, models=models, output=tmp_path)
+    assert time.perf_counter() - started < 60
+    assert len(read_csv(tmp_path / "transfer.csv")) == 24
+
+
+@pytest.mark.parametrize(
+    ("settings", "error", "match"),
+    [
+        ({"models": ["cartpole", "nothing.xml"]}, MjCartPoleError, "nothing.xml"),
+        ({"edits": {"pole.lenght": 1.0}}, ConfigError, "pole.length"),
+        ({"models": ["a", "b"], "swept": "gravity=1:2:1"}, ConfigError, "one model"),
+        ({"models": ["gym"], "swept": "gravity=1:2:1"}, ConfigError, "cannot be swept"),
+        ({"swept": "gravity"}, ConfigError, "no sweep"),
+        ({"episodes": 0, "models": ["cartpole"]}, ConfigError, "episodes"),
+    ],
+)
+def test_mistakes_leave_nothing_behind(policies, tmp_path, settings, error, match):
+    with pytest.raises(error, match=match) as caught:
+        run_transfer(policies[:1], output=tmp_path / "out", **settings)
+    assert "\n" not in str(caught.value)
+    assert not list(tmp_path.glob("out/*"))
+
+
+def test_mistakes_in_the_sources(tmp_path, policies):
+    with pytest.raises(ConfigError, match="RUN-OR-POLICY"):
+        run_transfer([])
+    with pytest.raises(RunError, match="no run folder or policy file"):
+        run_transfer([tmp_path / "nowhere"])
+    (tmp_path / "taken").write_text("")
+    with pytest.raises(FileError, match="taken"):
+        run_transfer(policies[:1], models=["cartpole"], output=tmp_path / "taken")
+
+
+def test_a_table_is_never_replaced_unasked(policies, tmp_path, capsys):
+    for _ in range(2):
+        run_transfer(policies[:1], models=["gym"], episodes=2)
+        run_transfer(policies[:1], swept="gravity=9:10:1", episodes=2)
+    out = capsys.readouterr().out
+    names = ["sweep-gravity", "sweep-gravity-2", "transfer", "transfer-2"]
+    assert sorted({path.stem for path in (tmp_path / "transfer").iterdir()}) == names
+    for name in names:
+        assert f"written transfer/{name}.csv, .json and .png" in out
+    mine = tmp_path / "mine"
+    run_transfer(policies[:1], models=["gym"], episodes=2, output=mine)
+    (mine / "transfer.csv").unlink()
+    before = {path: path.read_bytes() for path in mine.iterdir()}
+    with pytest.raises(FileError, match=r"transfer\.json' exists.*--overwrite"):
+        run_transfer(policies[:1], models=["gym"], episodes=3, output=mine)
+    assert {path: path.read_bytes() for path in mine.iterdir()} == before
+    run_transfer(policies[:1], models=["gym"], episodes=3, output=mine, overwrite=True)
+    assert (mine / "transfer.csv").is_file()
+
+
+def test_no_plotting_library_is_needed(policies, tmp_path):
+    code = (
+        "import sys; from pathlib import Path; from mjcartpole.commands.transfer import *; "
+        f"run_transfer([Path({str(policies[0])!r})], models=['gym'], episodes=2); "
+        "print([name for name in ('matplotlib', 'dm_control', 'OpenGL') if name in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "[]"
+    assert done.stderr == ""

@@ -1,0 +1,99 @@
+"""From a training in progress to its results."""
+
+import json
+
+import pytest
+
+from mjcartpole.learning import runs
+from mjcartpole.learning.checkpoints import LATEST, load_checkpoint
+from mjcartpole.learning.config import TrainConfig
+from mjcartpole.learning.session import Session
+from mjcartpole.learning.training import Training, train
+from mjcartpole.physics.load import load_model
+from mjcartpole.studies.evaluation import evaluate
+from mjcartpole.studies.finish_training import evaluate_where_trained, finish_training
+
+CONFIG = TrainConfig(episodes=20, seed=6)
+CARTPOLE = load_model()
+
+
+def conduct(folder, *, stop_after=None, resume=False, engine="python", config=CONFIG):
+    """Train in a folder, to the end or to an episode."""
+    folder.mkdir(exist_ok=True)
+    training = Training(config, engine=engine, cartpole=CARTPOLE)
+    session = Session(folder, training, CARTPOLE, every=1e9)
+    if resume:
+        session.resume(load_checkpoint(folder / LATEST, config, CARTPOLE.xml))
+    for _ in session.run(lambda: len(training.log) == stop_after):
+        pass
+    return finish_training(session, folder, CARTPOLE, preset="tuned")
+
+
+def contents(folder):
+    names = (runs.EPISODES, runs.POLICY, runs.SUMMARY)
+    return {name: (folder / name).read_bytes() for name in names}
+
+
+@pytest.mark.parametrize("engine", ["python", "compiled"])
+def test_a_training_that_is_over_is_written_and_evaluated(engine, tmp_path):
+    result, summary, evaluation = conduct(tmp_path, engine=engine)
+    alone = train(CONFIG)
+    assert result.q_table.tobytes() == alone.q_table.tobytes()
+    assert evaluation.summary() == evaluate(alone.policy).summary()
+    assert json.loads((tmp_path / runs.SUMMARY).read_text()) == summary
+    assert summary == {
+        "preset": "tuned",
+        "backend": "mujoco",
+        "model": "cartpole",
+        "seed": 6,
+        "episodes": 20,
+        "interrupted": False,
+        "steps": alone.steps,
+        "mean_return_last_100": alone.returns.mean(),
+        "evaluation": evaluation.summary(),
+    }
+
+
+def test_a_training_that_was_stopped_is_written_and_not_evaluated(tmp_path):
+    result, summary, evaluation = conduct(tmp_path, stop_after=7)
+    assert evaluation is None
+    assert (summary["interrupted"], summary["episodes"]) == (True, 7)
+    assert "evaluation" not in summary
+    assert result.returns.tolist() == train(CONFIG).returns[:7].tolist()
+    assert len((tmp_path / runs.EPISODES).read_text().splitlines()) == 8
+
+
+@pytest.mark.parametrize("stops", [(1,), (7,), (3, 11, 19), (20,)])
+def test_a_training_that_was_stopped_ends_like_one_that_was_not(stops, tmp_path):
+    conduct(tmp_path / "whole", engine="compiled")
+    for number, stop in enumerate(stops):
+        conduct(tmp_path / "stopped", stop_after=stop, resume=number > 0)
+    conduct(tmp_path / "stopped", resume=True)
+    assert contents(tmp_path / "stopped") == contents(tmp_path / "whole")
+
+
+def test_results_that_a_kill_left_half_written_are_written_again(tmp_path):
+    conduct(tmp_path)
+    whole = contents(tmp_path)
+    names = (runs.EPISODES, runs.POLICY, runs.TIMING, runs.SUMMARY)
+    for count in range(len(names) + 1):
+        for name in names[count:]:
+            (tmp_path / name).unlink(missing_ok=True)
+        conduct(tmp_path, resume=True)
+        assert contents(tmp_path) == whole
+
+
+@pytest.mark.parametrize(
+    "config",
+    [
+        TrainConfig(episodes=9, backend="gym"),
+        TrainConfig(episodes=9, integrator="mujoco"),
+        TrainConfig(episodes=9),
+    ],
+)
+@pytest.mark.parametrize("engine", ["python", "compiled"])
+def test_a_policy_is_evaluated_where_it_was_trained(config, engine):
+    result = train(config)
+    found = evaluate_where_trained(result.policy, result.config, CARTPOLE, engine)
+    again = evaluate(result.policy, backend=config.backend, integrator=config.integrator)
+    assert found == again
