@@ -49,18 +49,18 @@ __all__ = [
 ]
 
 _HOMES = {
-    "CartPole": "physics.model",
+    "CartPole": "physics.load",
     "CartPoleEnv": "envs.cartpole",
     "CartPoleVectorEnv": "envs.vector",
     "Evaluation": "studies.evaluation",
-    "ManyResult": "studies.seeds",
+    "ManyResult": "studies.multi_seed",
     "Policy": "learning.policy",
     "Simulation": "physics.simulation",
     "TrainConfig": "learning.config",
     "TrainResult": "learning.training",
     "evaluate": "studies.evaluation",
-    "load_model": "physics.model",
-    "model_names": "physics.model",
+    "load_model": "physics.load",
+    "model_names": "physics.load",
     "train": "learning.training",
     "train_many": "studies.many",
 }

@@ -67,7 +67,7 @@ class Watcher:
 
     def _read(self):
         for line in self.process.stdout:
-            self.lines.set_state(line.rstrip("\n"))
+            self.lines.put(line.rstrip("\n"))
 
     def until(self, word, seconds=60):
         """The lines up to one whose first word is this."""

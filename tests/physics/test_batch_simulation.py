@@ -66,7 +66,7 @@ def test_changing_threads_changes_no_bit(integrator, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("n", "timestep", "cores", "crew"),
+    ("n", "timestep", "cores", "threads"),
     [
         (1, 0.02, 64, 1),
         (2, 0.02, 64, 1),
@@ -79,12 +79,12 @@ def test_changing_threads_changes_no_bit(integrator, monkeypatch):
         (1024, 0.02, 1, 1),
     ],
 )
-def test_few_simulations_never_wake_many_threads(n, timestep, cores, runner, monkeypatch):
+def test_few_simulations_never_wake_many_threads(n, timestep, cores, threads, monkeypatch):
     monkeypatch.setattr(batch_simulation, "available_cores", lambda: cores)
     cartpole = load_model("cartpole", {"option.timestep": timestep})
     simulation = BatchSimulation(cartpole, n)
-    assert simulation.threads == runner
-    assert (simulation._other is None) == (runner == 1)
+    assert simulation.threads == threads
+    assert (simulation._other is None) == (threads == 1)
     assert BatchSimulation(cartpole, n, threads=3).threads == min(3, n)
 
 

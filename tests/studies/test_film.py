@@ -278,11 +278,12 @@ LONG = """
     import numpy as np
     sys.path.insert(0, sys.argv[1])
     from test_film import SMALL, some_policy
-    from mjcartpole.studies.film import Film, Look, Stage, play
+    from mjcartpole.studies.film import Film, PolicySetup, VideoOptions, play
     from mjcartpole.media.video import write_video
 
     def write(speed):
-        with Film([play(Stage("some", some_policy()))] * 2, Look(**SMALL, speed=speed)) as film:
+        casts = [play(PolicySetup("some", some_policy()))] * 2
+        with Film(casts, VideoOptions(**SMALL, speed=speed)) as film:
             return write_video(sys.argv[2], film.frames()).frames
 
     write(0.2)

@@ -14,7 +14,7 @@ from mjcartpole.files import brief, is_folder, names_in, remove_leftovers
 
 LOCK: Final = ".lock"
 SEEDS: Final = "seeds.json"
-"""Lies in a folder of many runs (see studies/seed_runs.py)."""
+"""Lies in a folder of many runs (see studies/multi_seed_runs.py)."""
 
 
 def free_folder(parent: Path, name: str) -> Path:

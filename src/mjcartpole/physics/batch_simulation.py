@@ -70,11 +70,11 @@ class BatchSimulation:
         self._moves = np.empty((n, joints))
         model = stepping_model(cartpole.model, integrator)
         self._is_remembering = _remembers_more_than_its_state(model)
-        runner = threads or _largest_crew(n, cartpole.substeps)
-        self._use(mujoco_batch.Batch(model, n, runner, self._is_remembering))
+        chosen = threads or _largest_crew(n, cartpole.substeps)
+        self._use(mujoco_batch.Batch(model, n, chosen, self._is_remembering))
         self._fresh = self._batch.state[0].copy()
         self._other: mujoco_batch.Batch | None = None
-        if threads is None and runner > 1 and not self._is_remembering:
+        if threads is None and chosen > 1 and not self._is_remembering:
             self._other = mujoco_batch.Batch(model, n, 1)
         self._laps: collections.deque[float] = collections.deque(maxlen=_TRIAL - 2)
         self._until_choice, self._to_beat = _TRIAL, float("nan")
@@ -103,7 +103,7 @@ class BatchSimulation:
         """Put some cart-poles into states, one row each; nothing of their past remains."""
         if self._is_remembering:
             everyone = np.arange(len(self.state))
-            self._batch.reset(everyone[ids], setup=int(mujoco.mjtStage.mjSTAGE_NONE))
+            self._batch.reset(everyone[ids], stage=int(mujoco.mjtStage.mjSTAGE_NONE))
         else:
             # The row is all there is, and to copy it is a hundred times quicker than `reset`.
             self._batch.state[ids] = self._fresh
