@@ -12,7 +12,7 @@ import pytest
 
 from mjcartpole import cli
 from mjcartpole.learning import runs
-from mjcartpole.learning.checkpoints import LATEST, PREVIOUS
+from mjcartpole.learning.checkpoints import FORMER, LATEST
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.session import Session
 from mjcartpole.learning.training import Training
@@ -117,7 +117,7 @@ def use(kind, rng):
     if rng.random() < 0.1:
         yield ["render", one, "--sheet", "--size", "64x48", "-o", "sheet.png"]
     yield ["train", "--resume", "run"]
-    yield ["train", "--resume", f"{one}/{PREVIOUS}"]
+    yield ["train", "--resume", f"{one}/{FORMER}"]
     yield [*overwrite, "--seeds", "2"] if many else [*overwrite, "--no-video"]
 
 
@@ -156,7 +156,7 @@ OTHERS = {
 }
 PLACES = [
     *(("one", name) for name in (*runs.FILES, ".lock", ".config-0123abcd.json")),
-    *(("cut", name) for name in (LATEST, PREVIOUS)),
+    *(("cut", name) for name in (LATEST, FORMER)),
     *(("many", name) for name in ("seeds.json", "model.xml", "seed-0", "seed-1/config.json")),
     *(("manycut", name) for name in ("seed-0/summary.json", "seed-1", f"seed-1/{LATEST}")),
 ]

@@ -6,7 +6,6 @@ needs them, so `--help` is quick.
 """
 
 import contextlib
-import dataclasses
 import io
 import json
 import logging
@@ -254,13 +253,10 @@ def _parse_size(text: str) -> tuple[int, int]:
 
 def _check_only_resumed(command: Train) -> None:
     """A resumed training keeps its config: refuse flags that would be ignored."""
-    default = Train(config=TrainConfig.preset(command.preset))
-    fields = dataclasses.fields(TrainConfig)
-    given = [
-        field.name
-        for field in fields
-        if getattr(command.config, field.name) != getattr(default.config, field.name)
-    ]
+    method = command.config.method
+    default = Train(config=TrainConfig.preset(command.preset, method=method))
+    asked, usual = command.config.values(), default.config.values()
+    given = [name for name in asked if asked[name] != usual[name]]
     others = ("preset", "run_dir", "overwrite", "seeds")
     given += [name for name in others if getattr(command, name) != getattr(default, name)]
     if given:

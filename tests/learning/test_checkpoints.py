@@ -16,10 +16,8 @@ from hypothesis import strategies as st
 from mjcartpole.errors import CheckpointError, FileError
 from mjcartpole.learning.checkpoints import (
     LATEST,
-    PREVIOUS,
     Checkpoint,
     checksum,
-    keep_only,
     load_checkpoint,
     save_checkpoint,
 )
@@ -70,7 +68,7 @@ def test_a_checkpoint_comes_back_bit_for_bit(checkpoint, content, scratch):
     again = load_checkpoint(scratch, CONFIG, DOCUMENT)
     old, new = checkpoint.snapshot, again.snapshot
     assert (again.config, again.model, again.episodes) == (CONFIG, checksum(DOCUMENT), 7)
-    assert new.q_table.tobytes() == old.q_table.tobytes()
+    assert new.memory["q_table"].tobytes() == old.memory["q_table"].tobytes()
     assert (new.env_rng, new.learner_rng, new.seconds) == (
         old.env_rng,
         old.learner_rng,
@@ -93,36 +91,35 @@ def test_a_training_goes_on_from_its_checkpoint(config, tmp_path):
     whole, resumed = Training(config, engine="python"), Training(config, engine="python")
     resumed.restore(load_checkpoint(tmp_path / LATEST, config, DOCUMENT).snapshot)
     assert list(whole.run())[7:] == list(resumed.run())
-    assert resumed.learner.q_table.tobytes() == whole.learner.q_table.tobytes()
+    assert resumed.result().q_table.tobytes() == whole.result().q_table.tobytes()
     assert list(resumed.log) == list(whole.log)
 
 
-def test_the_last_two_are_kept(tmp_path):
+def test_one_is_kept(tmp_path):
     for episodes in (3, 4, 5):
         save_checkpoint(tmp_path, checkpoint_after(episodes))
-    assert sorted(path.name for path in tmp_path.iterdir()) == [PREVIOUS, LATEST]
-    for name, episodes in ((LATEST, 5), (PREVIOUS, 4)):
-        assert load_checkpoint(tmp_path / name, CONFIG, DOCUMENT).episodes == episodes
+    assert [path.name for path in tmp_path.iterdir()] == [LATEST]
+    assert load_checkpoint(tmp_path / LATEST, CONFIG, DOCUMENT).episodes == 5
 
 
-def test_damage_to_one_does_not_reach_the_other(tmp_path):
-    for episodes in (3, 4):
-        save_checkpoint(tmp_path, checkpoint_after(episodes))
-    keep_only(tmp_path, tmp_path / PREVIOUS)
-    assert load_checkpoint(tmp_path / LATEST, CONFIG, DOCUMENT).episodes == 3
-    with (tmp_path / LATEST).open("r+b") as file:
-        file.truncate(100)
-    assert_refused(tmp_path / LATEST)
-    assert load_checkpoint(tmp_path / PREVIOUS, CONFIG, DOCUMENT).episodes == 3
-
-
-def test_a_folder_in_the_way_leaves_the_one_that_is_there(tmp_path):
-    save_checkpoint(tmp_path, checkpoint_after(3))
-    (tmp_path / PREVIOUS).mkdir()
+def test_a_folder_in_the_way_is_left_alone(tmp_path):
+    (tmp_path / LATEST).mkdir()
     with pytest.raises(FileError):
         save_checkpoint(tmp_path, checkpoint_after(4))
-    assert load_checkpoint(tmp_path / LATEST, CONFIG, DOCUMENT).episodes == 3
-    assert sorted(path.name for path in tmp_path.iterdir()) == [PREVIOUS, LATEST]
+    assert [path.name for path in tmp_path.iterdir()] == [LATEST]
+
+
+def test_a_checkpoint_of_a_config_without_task_and_method_is_read(content, scratch):
+    """Version 0.1 wrote such, with a table of two columns."""
+    archive = dict(np.load(io.BytesIO(content[len(HEAD) + 65 :])))
+    about = json.loads(archive["about"].tobytes())
+    del about["config"]["task"], about["config"]["method"]
+    archive["about"] = np.frombuffer(json.dumps(about).encode(), np.uint8)
+    archive["q_table"] = archive["q_table"].reshape(-1, 2)
+    packed = io.BytesIO()
+    np.savez(packed, **archive)
+    scratch.write_bytes(sealed(packed.getvalue()))
+    assert load_checkpoint(scratch, CONFIG, DOCUMENT).episodes == 7
 
 
 def test_a_flipped_bit_is_refused_wherever_it_is(content, scratch):

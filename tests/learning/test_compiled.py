@@ -125,7 +125,7 @@ def outcome(config, engine, cartpole=None):
         error = str(diverged)
     snapshot = training.snapshot()
     return {
-        "table": snapshot.q_table.tobytes(),
+        "table": snapshot.memory["q_table"].tobytes(),
         "returns": snapshot.columns.totals.tolist(),
         "steps": snapshot.columns.steps.tolist(),
         "endings": [episode.ending for episode in training.log],
@@ -439,7 +439,10 @@ def test_ctrl_c_is_heard_between_chunks_and_nothing_is_torn(backend):
     while len(expected.log) < len(found.log):
         next(chunks)
     assert list(expected.log) == list(found.log)
-    assert expected.snapshot().q_table.tobytes() == found.snapshot().q_table.tobytes()
+    assert (
+        expected.snapshot().memory["q_table"].tobytes()
+        == found.snapshot().memory["q_table"].tobytes()
+    )
     assert expected.snapshot().env_rng == found.snapshot().env_rng
 
 

@@ -1,7 +1,5 @@
 """The pieces of the compiled loop, one by one, against what they stand for."""
 
-import hashlib
-import inspect
 import math
 import os
 import shutil
@@ -11,6 +9,7 @@ import sys
 import textwrap
 from pathlib import Path
 
+import numba
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -18,11 +17,16 @@ from hypothesis import strategies as st
 from numba.core.registry import cpu_target
 
 from mjcartpole import task
-from mjcartpole.learning import discretizer, episodes, kernels, qlearning, schedules, stepping
+from mjcartpole.learning import discretizer, episodes, kernels, schedules, stepping
 from mjcartpole.learning.compiled import _arrays
+from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.discretizer import Discretizer
+from mjcartpole.learning.learner import Learner
+from mjcartpole.learning.methods import METHODS, action_values, experience
+from mjcartpole.learning.methods.experience import Trajectory, Transition
+from mjcartpole.learning.stepping import compiled
 from mjcartpole.physics import cartpole_v1
-from mjcartpole.physics.simulation import LARGEST_SANE
+from mjcartpole.task import one_per_step
 
 quick = settings(max_examples=200)
 
@@ -33,12 +37,10 @@ def bits(*values):
 
 @pytest.mark.parametrize("terminated", [True, False])
 @pytest.mark.parametrize("x", [0.0, 2.4, -2.4, 2.5, -2.5, math.nan])
-def test_endings_and_rewards_are_those_of_the_rules(terminated, x):
-    assert kernels._ending_index(terminated, x) == episodes.ending_index(terminated, x)
-    for late in (True, False):
-        for sutton_barto in (True, False):
-            arguments = (terminated, late, sutton_barto)
-            assert kernels._reward(*arguments) == task.reward(*arguments)
+def test_endings_are_those_of_the_rules(terminated, x):
+    for limit in (2.4, 1.0, math.inf):
+        expected = episodes.ending_index(terminated, x, limit)
+        assert kernels._ending_index(terminated, x, limit) == expected
 
 
 @given(
@@ -55,56 +57,57 @@ def test_rows_are_the_discretizers(bins, low, width, values):
     edges = [(low[axis], high[axis], math.nextafter(high[axis], -9)) for axis in range(4)]
     for point in (values, *zip(*edges, strict=True)):
         expected = discretizer.row_of(point, grid.grid)
-        assert kernels._row_of(tuple(point), arrays) == expected < grid.n_states
-
-
-@given(
-    st.tuples(*[st.sampled_from([0.0, -0.0, 1.0]) | st.floats(-9, 9)] * 4),
-    st.sampled_from([0.0, 0.3, 1.0]),
-    st.booleans(),
-)
-@quick
-def test_choices_draw_the_same_numbers(values, epsilon, draw_ties):
-    table = np.array(values)
-    ours, reference = np.random.default_rng(3), np.random.default_rng(3)
-    for s in (0, 1, 0, 1):
-        expected = qlearning.choose(table, s, epsilon, draw_ties, reference)
-        assert kernels._choose(table, s, epsilon, draw_ties, ours) == expected
-    assert ours.bit_generator.state == reference.bit_generator.state
+        assert stepping._row_of(tuple(point), arrays) == expected < grid.n_states
 
 
 rates = st.sampled_from([0.0, 0.1, 1.0]) | st.floats(0, 1)
-tables = st.lists(st.floats(-1e3, 1e3), min_size=8, max_size=8)
+tables = st.lists(st.sampled_from([0.0, -0.0, 1.0]) | st.floats(-1e3, 1e3), min_size=8, max_size=8)
+rows = st.lists(st.integers(0, 3), min_size=1, max_size=30)
 
 
-@given(tables, rates, rates, st.integers(0, 3), st.integers(0, 1), st.integers(0, 3), st.booleans())
-@quick
-def test_a_step_teaches_the_same(table, alpha, gamma, s, a, s_next, terminated):
-    ours, reference = np.array(table), np.array(table)
-    for step, q in ((kernels._learn_step, ours), (qlearning.learn_step, reference)):
-        step(q, s, a, 1.0, s_next, terminated, alpha, gamma)
-    assert ours.tobytes() == reference.tobytes()
-
-
-@given(
-    tables, rates, rates, rates, st.lists(st.integers(0, 3), min_size=1, max_size=30), st.booleans()
-)
-@quick
-def test_an_episode_teaches_the_same(table, alpha, gamma, lam, visited, over):
-    visited = np.array(visited)
+@numba.njit
+def learn(act, after_step, after_episode, p, memory, rates, visited, terminated, rng):
     steps = len(visited) - 1
-    actions, rewards = visited[::-1] % 2, np.linspace(1, 2, steps + 1)
-    ours, reference = np.array(table), np.array(table)
-    for learn, q in ((kernels._learn_episode, ours), (qlearning.learn_episode, reference)):
-        learn(q, visited, actions, rewards, steps, over, alpha, gamma, lam)
-    assert ours.tobytes() == reference.tobytes()
+    actions, rewards = np.zeros(steps, np.int64), np.linspace(1.0, 2.0, steps)
+    for t in range(steps):
+        actions[t] = act(p, memory, rates, visited[t], rng)
+        over = t == steps - 1
+        step = Transition(
+            visited[t], actions[t], rewards[t], visited[t + 1], terminated and over, over
+        )
+        after_step(p, memory, rates, step, rng)
+    after_episode(p, memory, rates, Trajectory(visited, actions, rewards, steps, terminated), rng)
+
+
+@pytest.mark.parametrize("name", METHODS)
+@given(tables, rates, rates, rates, rates, rows, st.booleans(), st.booleans(), st.booleans())
+@quick
+def test_every_method_learns_the_same_compiled(
+    name, table, alpha, epsilon, gamma, lam, visited, terminated, last, ties
+):
+    values = {"alpha": alpha, "epsilon": epsilon, "gamma": gamma, "learn_last_step": last}
+    if name == "q-learning":
+        values["td_lambda"] = lam if lam != 0.1 else None
+    values["ties"] = "random" if ties else "first"
+    found = []
+    for function in (learn, learn.py_func):
+        learner = Learner(TrainConfig(method=name, **values), 4)
+        learner.memory.q_table[:] = table
+        functions = ("begin_episode", "act", "after_step", "after_episode")
+        _, *used = (kernels._compilable(getattr(learner.method, each)) for each in functions)
+        rates = learner.method.begin_episode(learner.p, learner.memory, 3, 10)
+        places = np.array(visited)
+        function(*used, learner.p, learner.memory, rates, places, terminated, learner.rng)
+        memory = [array.tobytes() for array in learner.memory]
+        found.append((memory, learner.rng.bit_generator.state))
+    assert found[0] == found[1]
 
 
 @given(rates, rates, st.floats(0, 2000), st.integers(0, 3000))
 @quick
 def test_schedules_are_the_same_line(start, end, length, number):
     expected = schedules.linear(start, end, length, number)
-    assert bits(kernels._linear(start, end, length, number)) == bits(expected)
+    assert bits(compiled(schedules.linear)(start, end, length, number)) == bits(expected)
 
 
 def key_of(entry):
@@ -112,33 +115,40 @@ def key_of(entry):
     return entry._cache._index_key((), cpu_target.target_context.codegen())
 
 
-@pytest.mark.parametrize("make", [kernels._make_learn_chunk, kernels._make_play_chunk])
-def test_other_sources_are_another_entry_of_the_cache(make):
-    first, again, other = (kernels._entry(make(sources)) for sources in ("a", "a", "b"))
-    assert key_of(first) == key_of(again) != key_of(other)
+def test_the_same_method_and_reward_are_the_same_entry_of_the_cache():
+    def keys():
+        kernels.learn_chunk.cache_clear()
+        return [key_of(kernels.learn_chunk(each, one_per_step)) for each in METHODS.values()]
+
+    assert keys() == keys()
+    assert len(set(keys())) == len(METHODS)
 
 
 def test_the_checksum_covers_all_that_is_compiled_from_elsewhere():
-    for entry in (kernels.learn_chunk, kernels.play_chunk):
-        assert [cell.cell_contents for cell in entry.py_func.__closure__] == [kernels._sources()]
-    functions = [value.py_func for value in vars(kernels).values() if hasattr(value, "py_func")]
-    elsewhere = {function.__module__ for function in functions} - {kernels.__name__}
-    functions = [value.py_func for value in vars(stepping).values() if hasattr(value, "py_func")]
-    elsewhere |= {function.__module__ for function in functions}
-    covered = (cartpole_v1, discretizer, episodes, qlearning, schedules, stepping, task)
-    assert elsewhere == {module.__name__ for module in covered}
-    texts = "".join(inspect.getsource(module) for module in covered) + repr(LARGEST_SANE)
-    assert hashlib.sha256(texts.encode()).hexdigest() == kernels._sources()
+    for method in METHODS.values():
+        kernels.learn_chunk(method, one_per_step)
+    elsewhere = {function.__module__ for function in kernels._known}
+    for module in (kernels, stepping):
+        functions = [value.py_func for value in vars(module).values() if hasattr(value, "py_func")]
+        elsewhere |= {function.__module__ for function in functions}
+    methods = {method.__name__ for method in METHODS.values()}
+    shared = (cartpole_v1, discretizer, episodes, schedules, stepping, action_values, experience)
+    covered = {module.__name__ for module in (*shared, kernels, task)} | methods
+    assert elsewhere <= covered
+    assert kernels._sources() != kernels._sources(task)
 
 
 REWARDS = """
     import mjcartpole
     from mjcartpole.learning import kernels
     from mjcartpole.learning.config import TrainConfig
+    from mjcartpole.learning.methods import q_learning
+    from mjcartpole.task import one_per_step
     from mjcartpole.learning.training import train
     result = train(TrainConfig(backend="gym", episodes=9))
     print(mjcartpole.__file__, result.returns.sum() / result.steps)
-    print(sum(kernels.learn_chunk.stats.cache_hits.values()))
+    entry = kernels.learn_chunk(q_learning, one_per_step)
+    print(sum(entry.stats.cache_hits.values()))
 """
 
 
@@ -169,6 +179,6 @@ def test_an_edit_of_the_rules_reaches_what_is_compiled(tmp_path):
     assert run() == [init, "1.0", "0"]
     assert run() == [init, "1.0", "1"]
     rules = (package / "task.py").read_text()
-    assert "else 1.0" in rules
-    (package / "task.py").write_text(rules.replace("else 1.0", "else 3.0"))
+    assert "    return 1.0\n" in rules
+    (package / "task.py").write_text(rules.replace("    return 1.0\n", "    return 3.0\n"))
     assert run() == [init, "3.0", "0"]

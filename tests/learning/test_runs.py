@@ -9,7 +9,7 @@ import pytest
 
 from mjcartpole.errors import CheckpointError, FileError, ModelError, PolicyFileError, RunError
 from mjcartpole.learning import documents, folders, run_model, runs
-from mjcartpole.learning.checkpoints import LATEST, PREVIOUS
+from mjcartpole.learning.checkpoints import LATEST
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.session import Session
 from mjcartpole.learning.training import Training, train
@@ -229,41 +229,29 @@ def resumed(path):
 
 
 def test_a_run_that_was_begun_comes_back(begun, result):
-    for path in (begun, begun / LATEST, begun / PREVIOUS):
+    for path in (begun, begun / LATEST):
         found = resumed(path)
         assert (found.folder, found.preset, found.video) == (begun, "article", True)
         assert found.config == result.config
         assert found.cartpole.name == "cartpole"
         assert same_model(found.cartpole.model, load_model().model)
         assert found.checkpoint.episodes >= 5
-    assert sorted(path.name for path in begun.iterdir()) == sorted(
-        [*runs.BEGINNING, LATEST, PREVIOUS]
-    )
+    assert sorted(path.name for path in begun.iterdir()) == sorted([*runs.BEGINNING, LATEST])
 
 
 def test_a_run_without_checkpoints_begins_again(begun):
-    for name in (LATEST, PREVIOUS):
-        (begun / name).unlink()
+    (begun / LATEST).unlink()
     assert resumed(begun).checkpoint is None
 
 
-def test_the_checkpoint_that_is_chosen_becomes_the_latest(begun):
-    good = (begun / PREVIOUS).read_bytes()
-    (begun / LATEST).unlink()
+def test_a_damaged_checkpoint_is_refused_and_a_good_copy_is_taken(begun):
+    good = begun / "copy.bin"
+    (begun / LATEST).rename(good)
     (begun / LATEST).write_bytes(b"damaged")
-    with pytest.raises(CheckpointError, match=f"is good: mjcartpole train --resume .*{PREVIOUS}"):
+    with pytest.raises(CheckpointError, match="start again with --overwrite"):
         resumed(begun)
     assert (begun / LATEST).read_bytes() == b"damaged"
-    resumed(begun / PREVIOUS)
-    assert (begun / LATEST).read_bytes() == good
-
-
-def test_two_bad_checkpoints(begun):
-    for name in (LATEST, PREVIOUS):
-        (begun / name).unlink()
-        (begun / name).write_bytes(b"damaged")
-    with pytest.raises(CheckpointError, match="there is no good one before it"):
-        resumed(begun)
+    assert resumed(good).checkpoint.episodes >= 5
 
 
 def test_a_folder_is_locked_once(begun):

@@ -112,7 +112,7 @@ def snapshots_of(config, engine):
 
 def content(snapshot):
     return (
-        snapshot.q_table.tobytes(),
+        snapshot.memory["q_table"].tobytes(),
         copy.deepcopy(snapshot.env_rng),
         copy.deepcopy(snapshot.learner_rng),
         [column.tobytes() for column in snapshot.columns],

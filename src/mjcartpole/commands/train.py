@@ -24,9 +24,10 @@ from mjcartpole.errors import ConfigError
 from mjcartpole.files import check_writable, is_file, make_folder
 from mjcartpole.learning import runs, tensorboard
 from mjcartpole.learning.checkpoints import LATEST
+from mjcartpole.learning.compiling import compiling
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.documents import CONFIG
-from mjcartpole.learning.engine import Engine, compiling
+from mjcartpole.learning.engine import Engine
 from mjcartpole.learning.folders import SEEDS, free_folder
 from mjcartpole.learning.naming import in_flags, namesakes, run_name
 from mjcartpole.learning.run_model import check_storable

@@ -8,6 +8,7 @@ import gymnasium
 from mjcartpole.envs.registration import ENV_ID
 from mjcartpole.errors import ConfigError
 from mjcartpole.integrator import Integrator, check_integrator
+from mjcartpole.task import CARTPOLE_V1, Task
 
 if TYPE_CHECKING:
     from mjcartpole.physics.load import ModelLike
@@ -45,7 +46,10 @@ def check_backend(
 
 
 def make_env(
-    backend: Backend, model: "ModelLike" = "cartpole", integrator: Integrator = "gym"
+    backend: Backend,
+    model: "ModelLike" = "cartpole",
+    integrator: Integrator = "gym",
+    task: Task = CARTPOLE_V1,
 ) -> gymnasium.Env[Any, Any]:
     """Make the environment of a backend, with the time limit of 500 steps.
 

@@ -2,27 +2,27 @@
 
 import logging
 from collections.abc import Callable, Iterator
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numba.core import config, event
 
-from mjcartpole import task
 from mjcartpole.envs.backend import Backend
 from mjcartpole.errors import SimulationError
 from mjcartpole.integrator import Integrator
 from mjcartpole.learning import kernels
+from mjcartpole.learning.compiling import compiling
 from mjcartpole.learning.discretizer import Discretizer, Grid
-from mjcartpole.learning.engine import compiling
 from mjcartpole.learning.episodes import EpisodeLog
+from mjcartpole.learning.learner import Learner
 from mjcartpole.learning.loop import in_episode
 from mjcartpole.learning.policy import Policy
-from mjcartpole.learning.qlearning import TabularQ
-from mjcartpole.learning.stepping import GymPhysics, MujocoPhysics, Physics, PolesPhysics, link
+from mjcartpole.learning.stepping import GymPhysics, MujocoPhysics, Physics, Rules, link
 from mjcartpole.physics.cartpole_v1 import FORCE
 from mjcartpole.physics.library import libmujoco
 from mjcartpole.physics.load import CartPole, ModelLike, load_model
 from mjcartpole.physics.simulation import Simulation, check_sane
+from mjcartpole.task import CARTPOLE_V1, Task, state_names
 
 CHUNK_STEPS: Final = 50_000
 """Physics steps between two looks at what else is to be done: a twentieth of a second in MuJoCo."""
@@ -45,13 +45,20 @@ def unavailable(backend: Backend, cartpole: CartPole | None = None) -> str:
 class CompiledLoop:
     """Plays episodes of one backend, with or without learning."""
 
-    def __init__(self, backend: Backend, model: ModelLike, integrator: Integrator) -> None:
+    def __init__(
+        self,
+        backend: Backend,
+        model: ModelLike,
+        integrator: Integrator,
+        task: Task = CARTPOLE_V1,
+    ) -> None:
         """Load the model.
 
         Args:
             backend: Who does the physics. It must not be `unavailable`.
             model: See `load_model`; for backend mujoco.
             integrator: See `Simulation`; for backend mujoco.
+            task: The rules.
 
         Raises:
             ModelError: The model cannot be used.
@@ -60,9 +67,10 @@ class CompiledLoop:
             Simulation(load_model(model), integrator) if backend == "mujoco" else None
         )
         self._physics = _physics(self._simulation)
-        size = self._simulation.size if self._simulation else len(task.state_names())
+        self._task, self._rules = task, _rules(task)
+        size = self._simulation.size if self._simulation else len(state_names())
         self._chunk = _control_steps(self._simulation)
-        limit = task.TIME_LIMIT
+        limit = task.time_limit
         self._scratch = kernels.Scratch(
             states=np.zeros(limit + 1, np.int64),
             actions=np.zeros(limit, np.int64),
@@ -73,7 +81,7 @@ class CompiledLoop:
 
     def learn(
         self,
-        learner: TabularQ,
+        learner: Learner,
         discretizer: Discretizer,
         env_rng: np.random.Generator,
         log: EpisodeLog,
@@ -98,7 +106,7 @@ class CompiledLoop:
         while number < numbers.stop:
             self._scratch.finished[0] = number
             try:
-                self._learn(learner, discretizer, env_rng, log, (number, numbers.stop))
+                self._learn(learner, discretizer, env_rng, log, number, numbers.stop)
             finally:
                 # A signal that came meanwhile is raised before `_run` can return anything.
                 number = int(self._scratch.finished[0])
@@ -108,30 +116,32 @@ class CompiledLoop:
 
     def compile(
         self,
-        learner: TabularQ,
+        learner: Learner,
         discretizer: Discretizer,
         env_rng: np.random.Generator,
         log: EpisodeLog,
     ) -> None:
         """Compile what `learn` runs, or load it from the cache; nothing is learned."""
-        self._learn(learner, discretizer, env_rng, log, (0, 0))
+        self._learn(learner, discretizer, env_rng, log, 0, 0)
 
     def _learn(
         self,
-        learner: TabularQ,
+        learner: Learner,
         discretizer: Discretizer,
         env_rng: np.random.Generator,
         log: EpisodeLog,
-        numbers: tuple[int, int],
+        start: int,
+        stop: int,
     ) -> None:
         _run(
-            kernels.learn_chunk,
+            kernels.learn_chunk(learner.method, self._task.reward),
             self._physics,
+            self._rules,
             _arrays(discretizer.grid),
-            _method(learner),
-            learner.q_table.reshape(-1),
+            learner.p,
+            learner.memory,
             (env_rng, learner.rng),
-            numbers,
+            (start, stop, learner.episodes),
             self._chunk,
             log.storage,
             self._scratch,
@@ -144,10 +154,11 @@ class CompiledLoop:
             SimulationError: The physics diverged; names episode and step.
         """
         log = EpisodeLog(episodes)
-        common = (self._physics, _arrays(policy.discretizer.grid), policy.actions, env_rng)
+        grid = _arrays(policy.discretizer.grid)
+        common = (self._physics, self._rules, grid, policy.actions, env_rng)
         while len(log) < episodes:
             number = _run(
-                kernels.play_chunk,
+                kernels.play_chunk(self._task.reward),
                 *common,
                 (len(log), episodes),
                 self._chunk,
@@ -176,26 +187,30 @@ def _physics(simulation: Simulation | None) -> Physics:
         return GymPhysics(-FORCE, FORCE)
     cartpole, model, data = simulation.cartpole, simulation.model, simulation.data
     left, right = cartpole.controls
-    common: dict[str, Any] = {
-        "model": model._address,
-        "data": data._address,
-        "qpos": data.qpos,
-        "qvel": data.qvel,
-        "ctrl": data.ctrl,
-        "left": left,
-        "right": right,
-        "timestep": float(model.opt.timestep),
-        "substeps": cartpole.substeps,
-        "explicit": simulation.integrator == "gym",
-    }
-    if cartpole.poles == 1:
-        return MujocoPhysics(slider=cartpole.slider, hinge=cartpole.hinges[0], **common)
-    return PolesPhysics(
+    return MujocoPhysics(
+        model=model._address,
+        data=data._address,
+        qpos=data.qpos,
+        qvel=data.qvel,
+        ctrl=data.ctrl,
         joints=np.array(cartpole.joints, np.int64),
-        state=np.zeros(simulation.size),
+        left=left,
+        right=right,
+        timestep=float(model.opt.timestep),
+        substeps=cartpole.substeps,
+        explicit=simulation.integrator == "gym",
         seen=np.zeros(simulation.size),
         moved=np.zeros(len(cartpole.joints)),
-        **common,
+    )
+
+
+def _rules(task: Task) -> Rules:
+    return Rules(
+        x_limit=float(task.x_limit),
+        theta_limit=float(task.theta_limit),
+        low=float(task.start_low),
+        width=float(task.start_high - task.start_low),
+        time_limit=task.time_limit,
     )
 
 
@@ -212,22 +227,6 @@ def _arrays(grid: Grid) -> Grid:
         np.array(grid.low, np.float64),
         np.array(grid.high, np.float64),
         np.array(grid.width, np.float64),
-    )
-
-
-def _method(learner: TabularQ) -> kernels.Method:
-    alpha, epsilon = learner.alpha_schedule, learner.epsilon_schedule
-    return kernels.Method(
-        gamma=float(learner.gamma),
-        td_lambda=float(learner.td_lambda or 0.0),
-        stepwise=learner.td_lambda is None,
-        draw_ties=learner.draw_ties,
-        learn_last_step=learner.learn_last_step,
-        alpha=float(alpha.start),
-        alpha_final=float(alpha.end),
-        epsilon=float(epsilon.start),
-        epsilon_final=float(epsilon.end),
-        slope=float(alpha.episodes),
     )
 
 

@@ -1,18 +1,29 @@
-"""All that decides a training: `TrainConfig` and its presets.
+"""Training configs: `TrainConfig`, all that decides a training, and its presets.
 
-One place for each number: the command line's flags and their help are derived from this class.
+One place for each number: the command line's flags and their help are derived from this class, and
+from the parameters of the learning method (see `methods/`).
 """
 
 import dataclasses
+import functools
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final, get_args
+from typing import TYPE_CHECKING, Any, Final, Self
 
-from mjcartpole import task
 from mjcartpole.envs.backend import Backend, check_backend
 from mjcartpole.errors import ConfigError
 from mjcartpole.integrator import Integrator
-from mjcartpole.learning.discretizer import Discretizer, is_finite
-from mjcartpole.learning.qlearning import Ties
+from mjcartpole.learning.discretizer import Discretizer
+from mjcartpole.learning.methods import method_named
+from mjcartpole.learning.methods.parameters import Parameters
+from mjcartpole.task import (
+    CARTPOLE_V1,
+    Task,
+    in_words,
+    observation_bound,
+    state_names,
+    task_named,
+)
 
 if TYPE_CHECKING:
     from mjcartpole.physics.load import CartPole
@@ -26,10 +37,10 @@ MAX_EPISODES: Final = 1_000_000_000
 _MOST: Final = {"episodes": MAX_EPISODES, "log_every": MAX_EPISODES, "seed": MAX_SEED}
 
 _GRID: Final = ("bins", "low", "high")
-_DIMENSIONS: Final = len(task.state_names())
+_DIMENSIONS: Final = len(state_names())
 
 # The article's ranges, as its code has them: the float32 bound of the angle, and 3.5 rad/s.
-_ARTICLE_THETA = float(task.observation_bound()[2])
+_ARTICLE_THETA = float(observation_bound()[2])
 _ARTICLE: dict[str, Any] = {
     "episodes": 12_000,
     "bins": (1, 1, 25, 25),
@@ -70,10 +81,22 @@ PRESETS: Final[dict[str, dict[str, Any]]] = {
 }
 """What each preset changes in the defaults of `TrainConfig`, which are those of `tuned`."""
 
+DEFAULT_METHOD: Final = "q-learning"
+"""The method of every preset that names no other."""
+
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class TrainConfig:
-    """All that decides a training. Equal configs give equal tables, bit for bit."""
+    """All that decides a training. Equal configs give equal tables, bit for bit.
+
+    The fields below are those of every training; beside them a config has the parameters of its
+    method, under their own names.
+
+    >>> TrainConfig(alpha=0.2).gamma
+    0.98
+    >>> TrainConfig(method="sarsa", epsilon=0.5)
+    TrainConfig(method='sarsa', epsilon=0.5)
+    """
 
     backend: Backend = "mujoco"
     """Who does the physics: mujoco, or gymnasium's own CartPole-v1."""
@@ -85,6 +108,10 @@ class TrainConfig:
     """Let a control step be one physics step of the model's file, instead of 0.02 s."""
     integrator: Integrator = "gym"
     """gym: explicit Euler, as CartPole-v1; mujoco: the integrator that the model's file names."""
+    task: str = CARTPOLE_V1.name
+    """The rules: limits, starting states, reward, time limit."""
+    method: str = DEFAULT_METHOD
+    """How the table learns; each method has parameters of its own."""
     episodes: int = 1_500
     """Episodes to train."""
     seed: int = 0
@@ -96,30 +123,32 @@ class TrainConfig:
     """Lower ends of the bins' ranges; what lies outside belongs to the edge bins."""
     high: tuple[float, ...] = (2.4, 0.75, 0.2095, 1.5)
     """Upper ends of the bins' ranges."""
-    gamma: float = 0.98
-    """Discount per step."""
-    alpha: float = 0.1
-    """Step size at the start."""
-    alpha_final: float = 0.01
-    """Step size once decayed."""
-    epsilon: float = 1.0
-    """Probability of a random action at the start."""
-    epsilon_final: float = 0.01
-    """Probability of a random action once decayed."""
-    decay: float = 0.5
-    """Share of the episodes over which alpha and epsilon fall, linearly."""
-    q_init_low: float = 10.0
-    """The table starts uniformly random between this …"""
-    q_init_high: float = 10.0
-    """… and this."""
-    td_lambda: float | None = 0.9
-    """Learn after each episode from lambda-returns with this lambda; None: after each step."""
-    ties: Ties = "first"
-    """Between equal values: the first action, or a random one."""
-    learn_last_step: bool = True
-    """Learn from the step that ends an episode (the article's code does not)."""
     log_every: int = 150
     """Episodes per row of the printed table."""
+
+    if TYPE_CHECKING:
+
+        def __init__(self, **values: Any) -> None: ...
+        def __getattr__(self, name: str) -> Any: ...
+
+    else:
+
+        def __new__(cls, **values: Any) -> Self:
+            """Make a config of the class that has the parameters of the method as well."""
+            wanted = config_class(values.get("method", cls.method))
+            if unknown := sorted(set(values) - set(wanted.fields())):
+                raise ConfigError(
+                    f"method {wanted.method!r} has no {', '.join(unknown)}; available: "
+                    f"{', '.join(wanted.fields())}"
+                )
+            # Where that class is another one than `cls`, Python does not call its `__init__`.
+            made = object.__new__(wanted)
+            if not issubclass(wanted, cls):
+                made.__init__(**values)
+            return made
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _from_values, (self.values(),)
 
     def __post_init__(self) -> None:
         for name in (*_GRID, "set"):
@@ -127,16 +156,18 @@ class TrainConfig:
         check_backend(
             self.backend, self.model, self.integrator, self.set, own_timestep=self.own_timestep
         )
+        _ = self.rules
         self._check_counts()
-        self._check_numbers()
         self._check_dimensions()
-        if self.ties not in get_args(Ties):
-            raise ConfigError(f"ties must be 'first' or 'random', not {self.ties!r}")
+        assert isinstance(self, Parameters)
+        self.check_parameters()
         _ = self.discretizer(self._most_poles)
 
     @classmethod
-    def preset(cls, name: str, **changes: Any) -> "TrainConfig":  # noqa: ANN401
-        """A preset's config with some fields changed.
+    def preset(cls, name: str, **changes: Any) -> "TrainConfig":
+        """Return a preset's config with some fields changed.
+
+        With another method than its own, a preset gives what that method has of it.
 
         Args:
             name: `tuned`, `article`, `article-terminal` or `two-poles`.
@@ -147,28 +178,38 @@ class TrainConfig:
         """
         if name not in PRESETS:
             raise ConfigError(f"preset '{name}' is unknown; available: {', '.join(PRESETS)}")
-        known = cls.fields()
-        unknown = sorted(set(changes) - set(known))
-        if unknown:
-            raise ConfigError(
-                f"TrainConfig has no field {', '.join(unknown)}; available: {', '.join(known)}"
-            )
-        return cls(**{**PRESETS[name], **changes})
+        preset = {"method": DEFAULT_METHOD, **PRESETS[name]}
+        method = changes.get("method", preset["method"])
+        known = config_class(method).fields()
+        return cls(**{each: preset[each] for each in preset if each in known} | changes)
 
     def __repr__(self) -> str:
         """What differs from the defaults; it evaluates to an equal config."""
-        fields = dataclasses.fields(self)
-        values = ((field, getattr(self, field.name)) for field in fields)
-        changed = [f"{field.name}={value!r}" for field, value in values if value != field.default]
+        defaults = {field.name: field.default for field in dataclasses.fields(self)}
+        defaults["method"] = DEFAULT_METHOD
+        changed = [f"{n}={v!r}" for n, v in self.values().items() if v != defaults[n]]
         return f"TrainConfig({', '.join(changed)})"
 
     @classmethod
     def fields(cls) -> dict[str, Any]:
-        """Each field's type, by name."""
+        """Return each field's type, by name."""
         return {field.name: field.type for field in dataclasses.fields(cls)}
 
+    def values(self) -> dict[str, Any]:
+        """Return each field's value, by name; `TrainConfig(**values)` is an equal config."""
+        return {name: getattr(self, name) for name in self.fields()}
+
+    @property
+    def rules(self) -> Task:
+        """The task itself.
+
+        Raises:
+            ConfigError: There is none of that name.
+        """
+        return task_named(self.task)
+
     def load_model(self) -> "CartPole":
-        """The model that the config names; for backend gym the reference, which is drawn for it.
+        """Load the model that the config names; for backend gym the reference, as it is drawn.
 
         Raises:
             ModelError: It cannot be used.
@@ -179,7 +220,7 @@ class TrainConfig:
         return load_model(self.model, self.set, own_timestep=self.own_timestep)
 
     def discretizer(self, poles: int = 1) -> Discretizer:
-        """The grid for a model with so many poles.
+        """Return the grid for a model with so many poles.
 
         >>> TrainConfig(bins=(1, 3, 6, 8)).discretizer(poles=2).bins
         (1, 3, 6, 8, 6, 8)
@@ -187,14 +228,14 @@ class TrainConfig:
         Raises:
             ConfigError: The config was made for another number of poles.
         """
-        wanted = len(task.state_names(poles))
+        wanted = len(state_names(poles))
         for name in _GRID:
             n = len(getattr(self, name))
             if n not in (_DIMENSIONS, wanted):
                 also = f" or {wanted}" if wanted != _DIMENSIONS else ""
                 raise ConfigError(
-                    f"{name} has {n} values, and the model has {task.in_words(poles)}; "
-                    f"give {_DIMENSIONS}{also} ({', '.join(task.state_names(poles))})"
+                    f"{name} has {n} values, and the model has {in_words(poles)}; "
+                    f"give {_DIMENSIONS}{also} ({', '.join(state_names(poles))})"
                 )
         bins, low, high = (_for_each_pole(getattr(self, name), poles) for name in _GRID)
         return Discretizer(bins, low, high)
@@ -208,7 +249,7 @@ class TrainConfig:
             values = getattr(self, name)
             if len(values) < _DIMENSIONS or len(values) % 2:
                 raise ConfigError(
-                    f"{name} needs {_DIMENSIONS} values ({', '.join(task.state_names())}), and two "
+                    f"{name} needs {_DIMENSIONS} values ({', '.join(state_names())}), and two "
                     f"more for each further pole, not {values}"
                 )
 
@@ -221,18 +262,32 @@ class TrainConfig:
             if getattr(self, name) > most:
                 raise ConfigError(f"{name} must be at most {most:,}; this one is larger")
 
-    def _check_numbers(self) -> None:
-        names = ["gamma", "alpha", "alpha_final", "epsilon", "epsilon_final", "decay"]
-        for name in [*names, "td_lambda"] if self.td_lambda is not None else names:
-            value = getattr(self, name)
-            if not (is_finite(value) and 0 <= value <= 1):
-                raise ConfigError(f"{name} must be a number from 0 to 1, not {value!r}")
-        low, high = self.q_init_low, self.q_init_high
-        if not (is_finite(low) and is_finite(high) and low <= high and is_finite(high - low)):
-            raise ConfigError(
-                "q_init_low and q_init_high must be finite, in order and not too far apart, "
-                f"not {low!r} and {high!r}"
-            )
+
+@functools.cache
+def config_class(method: str) -> type[TrainConfig]:
+    """Return the dataclass of a training by a method: the fields of both.
+
+    Raises:
+        ConfigError: There is no such method.
+    """
+    made: type[TrainConfig] = dataclasses.make_dataclass(
+        "TrainConfig",
+        [("method", str, dataclasses.field(default=method))],
+        bases=(method_named(method).Parameters, TrainConfig),
+        namespace={
+            "__doc__": TrainConfig.__doc__,
+            "__module__": __name__,
+            "__repr__": TrainConfig.__repr__,
+        },
+        frozen=True,
+        kw_only=True,
+        repr=False,
+    )
+    return made
+
+
+def _from_values(values: Mapping[str, Any]) -> TrainConfig:
+    return TrainConfig(**values)
 
 
 def _for_each_pole(values: tuple[Any, ...], poles: int) -> tuple[Any, ...]:

@@ -4,13 +4,15 @@ from pathlib import Path
 from typing import Any, Final
 
 from mjcartpole.envs.backend import Backend
-from mjcartpole.learning.config import TrainConfig
+from mjcartpole.learning.config import DEFAULT_METHOD, TrainConfig, config_class
 from mjcartpole.learning.episodes import ENDINGS
-from mjcartpole.learning.stored import Fields, read_document
+from mjcartpole.learning.stored import Fields, checked, read_document
 
 CONFIG, SUMMARY = "config.json", "summary.json"
 
-_CONFIG_FIELDS: Final[Fields] = {"preset": str, "video": bool, **TrainConfig.fields()}
+_ABOUT: Final[Fields] = {"preset": str, "video": bool}
+_ADDED: Final = ("task", "method")
+"""Fields that configs of version 0.1 lack: they had the default alone."""
 _SUMMARY_FIELDS: Final[Fields] = {
     "preset": str,
     "backend": Backend,
@@ -34,17 +36,31 @@ _SUMMARY_FIELDS: Final[Fields] = {
 
 
 def read_config(folder: Path) -> tuple[str, bool, TrainConfig]:
-    """Preset, whether there is a video, and config.
+    """Return preset, whether there is a video, and config.
 
     Raises:
         RunError: It is not there or damaged.
     """
 
     def made(values: dict[str, Any]) -> tuple[str, bool, TrainConfig]:
-        return values.pop("preset"), values.pop("video"), TrainConfig(**values)
+        about = {name: values[name] for name in _ABOUT if name in values}
+        others = {name: values[name] for name in values if name not in _ABOUT}
+        checked(about, _ABOUT)
+        return about["preset"], about["video"], read_values(others)
 
     otherwise = "is not the config of a run, or is damaged"
-    return read_document(folder / CONFIG, _CONFIG_FIELDS, made, otherwise)
+    return read_document(folder / CONFIG, None, made, otherwise)
+
+
+def read_values(values: dict[str, Any]) -> TrainConfig:
+    """Return the config of values that somebody else may have written.
+
+    Raises:
+        ValueError: They are none.
+    """
+    fields = config_class(str(values.get("method", DEFAULT_METHOD))).fields()
+    known = {f"{name}?" if name in _ADDED else name: fields[name] for name in fields}
+    return TrainConfig(**checked(values, known))
 
 
 def read_summary(folder: Path) -> dict[str, Any]:

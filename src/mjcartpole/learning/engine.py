@@ -1,7 +1,7 @@
-"""Who runs the loop: the compiled engine, or the reference loop in Python."""
+"""Engines: the loop compiled by Numba, or the reference loop in Python."""
 
 import logging
-from typing import TYPE_CHECKING, Final, Literal, get_args
+from typing import TYPE_CHECKING, Literal, get_args
 
 from mjcartpole.envs.backend import Backend
 from mjcartpole.errors import ConfigError
@@ -11,9 +11,6 @@ if TYPE_CHECKING:
 
 Engine = Literal["compiled", "python"]
 """`compiled`: the loop compiled by Numba; `python`: the same in Python. They give the same bits."""
-
-compiling: Final[set[object]] = set()
-"""Whoever waits for the compiler now; empty where nobody does."""
 
 _log = logging.getLogger("mjcartpole")
 _said: set[str] = set()
@@ -30,7 +27,7 @@ def check_engine(engine: str) -> None:
 
 
 def choose_engine(engine: str, backend: Backend, cartpole: "CartPole | None" = None) -> Engine:
-    """The engine that was asked for, or the reference loop where that one cannot run.
+    """Return the engine that was asked for, or the reference loop where that one cannot run.
 
     Logs one line, once, where the reference loop takes over.
 

@@ -6,8 +6,6 @@ from typing import Final, Literal, NamedTuple, Self, overload
 import numpy as np
 import numpy.typing as npt
 
-from mjcartpole import task
-
 Ending = Literal["time limit", "off the track", "pole fell"]
 ENDINGS: Final[tuple[Ending, ...]] = ("time limit", "off the track", "pole fell")
 
@@ -25,16 +23,17 @@ class Episode(NamedTuple):
     ending: Ending
 
 
-def ending_index(terminated: bool, x: float) -> int:
-    """Why an episode ended, as an index of `ENDINGS`.
+def ending_index(terminated: bool, x: float, x_limit: float) -> int:
+    """Return why an episode ended, as an index of `ENDINGS`.
 
     Args:
         terminated: Whether the rules ended it.
         x: The cart's last position, m.
+        x_limit: How far it may be from the middle, m.
     """
     if not terminated:
         return 0
-    return 1 if abs(x) > task.X_LIMIT else 2
+    return 1 if abs(x) > x_limit else 2
 
 
 class Columns(NamedTuple):

@@ -1,38 +1,42 @@
 """The training loop compiled by Numba, with MuJoCo's own C step inside it.
 
-What it shares with the reference loop it shares as functions: `row_of`, `choose`, `learn_step`,
-`learn_episode`, `on_line` and the rules of `task.py` are compiled as they stand there. Only the
-loops around them are written a second time, in the order of `loop.py`, so that both draw the same
-numbers and round alike: tables, returns and policies are equal bit for bit.
+What it shares with the reference loop it shares as functions: `row_of`, the reward of the task and
+all functions of the learning method are compiled as they stand. Only the loop around them is
+written a second time, in the order of `loop.py`, so that both draw the same numbers and round
+alike: tables, returns and policies are equal bit for bit.
 """
 
 import functools
 import hashlib
 import inspect
+import sys
 from collections.abc import Callable
+from types import FunctionType
 from typing import Any, Final, NamedTuple, TypeAlias, cast
 
 import numba
 import numpy as np
 import numpy.typing as npt
+from numba.extending import register_jitable
 
 from mjcartpole import task
-from mjcartpole.learning import discretizer, episodes, qlearning, schedules, stepping
+from mjcartpole.learning import discretizer, episodes, schedules, stepping
 from mjcartpole.learning.discretizer import Grid
 from mjcartpole.learning.episodes import Columns
-from mjcartpole.learning.qlearning import Table
+from mjcartpole.learning.methods import action_values, experience
+from mjcartpole.learning.methods.experience import Trajectory, Transition
 from mjcartpole.learning.stepping import (
     F,
     Floats,
     Physics,
-    State,
+    Rules,
     advance,
     begin,
     compiled,
-    draw_start,
     has_diverged,
     is_over,
-    observe,
+    note,
+    row,
 )
 from mjcartpole.physics import cartpole_v1
 from mjcartpole.physics.simulation import LARGEST_SANE
@@ -42,23 +46,6 @@ DIVERGED: Final = -1
 
 Rngs: TypeAlias = tuple[np.random.Generator, np.random.Generator]
 """The environment's generator and the learner's."""
-
-
-class Method(NamedTuple):
-    """A Q-learner as the compiled loop sees it: see `TrainConfig`."""
-
-    gamma: float
-    td_lambda: float
-    stepwise: bool
-    """Learn after each step; else after each episode, by `td_lambda`."""
-    draw_ties: bool
-    learn_last_step: bool
-    alpha: float
-    alpha_final: float
-    epsilon: float
-    epsilon_final: float
-    slope: float
-    """Episodes until alpha and epsilon are at their final values."""
 
 
 class Scratch(NamedTuple):
@@ -73,115 +60,79 @@ class Scratch(NamedTuple):
     """Number of the next episode, shape (1,): it is known even where Ctrl-C swallows a return."""
 
 
-_row_of = compiled(discretizer.row_of)
-_choose = compiled(qlearning.choose)
-_learn_step = compiled(qlearning.learn_step)
-_learn_episode = compiled(qlearning.learn_episode)
-_linear = compiled(schedules.linear)
-_reward = compiled(task.reward)
 _ending_index = compiled(episodes.ending_index)
 
 
 @compiled
-def _note_failure(failure: Floats, steps: int, state: State) -> None:
-    failure[0] = steps
-    for index in range(len(state)):
-        failure[index + 1] = state[index]
-
-
-@compiled
-def _learn_stepwise(
+def _learn_episode(
+    act: Callable[..., int],
+    after_step: Callable[..., None],
+    after_episode: Callable[..., None],
+    reward: task.Reward,
     physics: Physics,
+    rules: Rules,
     grid: Grid,
-    method: Method,
-    q: Table,
+    p: Any,
+    memory: Any,
+    rates: Any,
     rngs: Rngs,
-    rates: tuple[float, float],
     scratch: Scratch,
 ) -> tuple[float, int, int]:
-    """Play an episode and learn after each step; returns its return, steps and ending."""
-    alpha, epsilon = rates
-    state = draw_start(physics, rngs[0])
-    begin(physics, state)
-    s = _row_of(observe(physics, state), grid)
-    total, steps, over, terminated = 0.0, 0, False, False
-    while not over:
-        a = _choose(q, s, epsilon, method.draw_ties, rngs[1])
-        state = advance(physics, state, a)
-        terminated = is_over(physics, state)
-        if terminated and has_diverged(state):
-            _note_failure(scratch.failure, steps, state)
-            return total, steps, DIVERGED
-        r = _reward(terminated, False, False)
-        total += r
-        steps += 1
-        over = terminated or steps == task.TIME_LIMIT
-        s_next = _row_of(observe(physics, state), grid)
-        if method.learn_last_step or not over:
-            _learn_step(q, s, a, r, s_next, terminated, alpha, method.gamma)
-        s = s_next
-    return total, steps, _ending_index(terminated, state[0])
-
-
-@compiled
-def _learn_afterwards(
-    physics: Physics,
-    grid: Grid,
-    method: Method,
-    q: Table,
-    rngs: Rngs,
-    rates: tuple[float, float],
-    scratch: Scratch,
-) -> tuple[float, int, int]:
-    """Play an episode, then learn from all of it; returns its return, steps and ending."""
-    alpha, epsilon = rates
+    """Play an episode and learn; returns its return, steps and ending."""
     states, actions, rewards = scratch.states, scratch.actions, scratch.rewards
-    state = draw_start(physics, rngs[0])
-    begin(physics, state)
-    states[0] = _row_of(observe(physics, state), grid)
+    state = begin(physics, rules, rngs[0])
+    s = row(physics, state, grid)
+    states[0] = s
     total, steps, over, terminated = 0.0, 0, False, False
     while not over:
-        actions[steps] = _choose(q, states[steps], epsilon, method.draw_ties, rngs[1])
-        state = advance(physics, state, actions[steps])
-        terminated = is_over(physics, state)
+        a = act(p, memory, rates, s, rngs[1])
+        state = advance(physics, state, a)
+        terminated = is_over(rules, state)
         if terminated and has_diverged(state):
-            _note_failure(scratch.failure, steps, state)
+            note(physics, state, steps, scratch.failure)
             return total, steps, DIVERGED
-        rewards[steps] = _reward(terminated, False, False)
-        total += rewards[steps]
+        r = reward(state[0], state[1], state[2], state[3], terminated)
+        total += r
+        actions[steps], rewards[steps] = a, r
         steps += 1
-        over = terminated or steps == task.TIME_LIMIT
-        states[steps] = _row_of(observe(physics, state), grid)
-    learned = steps if method.learn_last_step else steps - 1
-    closed = terminated and method.learn_last_step
-    _learn_episode(
-        q, states, actions, rewards, learned, closed, alpha, method.gamma, method.td_lambda
-    )
-    return total, steps, _ending_index(terminated, state[0])
+        over = terminated or steps == rules.time_limit
+        s_next = row(physics, state, grid)
+        after_step(p, memory, rates, Transition(s, a, r, s_next, terminated, over), rngs[1])
+        states[steps] = s_next
+        s = s_next
+    episode = Trajectory(states, actions, rewards, steps, terminated)
+    after_episode(p, memory, rates, episode, rngs[1])
+    return total, steps, _ending_index(terminated, state[0], rules.x_limit)
 
 
 @compiled
-def _play(
+def _play_episode(
+    reward: task.Reward,
     physics: Physics,
+    rules: Rules,
     grid: Grid,
     actions: npt.NDArray[np.int64],
     rng: np.random.Generator,
     failure: Floats,
 ) -> tuple[float, int, int]:
     """Play an episode without learning; returns its return, steps and ending."""
-    state = draw_start(physics, rng)
-    begin(physics, state)
+    state = begin(physics, rules, rng)
     total, steps, over, terminated = 0.0, 0, False, False
     while not over:
-        state = advance(physics, state, actions[_row_of(observe(physics, state), grid)])
-        terminated = is_over(physics, state)
+        state = advance(physics, state, actions[row(physics, state, grid)])
+        terminated = is_over(rules, state)
         if terminated and has_diverged(state):
-            _note_failure(failure, steps, state)
+            note(physics, state, steps, failure)
             return total, steps, DIVERGED
-        total += _reward(terminated, False, False)
+        total += reward(state[0], state[1], state[2], state[3], terminated)
         steps += 1
-        over = terminated or steps == task.TIME_LIMIT
-    return total, steps, _ending_index(terminated, state[0])
+        over = terminated or steps == rules.time_limit
+    return total, steps, _ending_index(terminated, state[0], rules.x_limit)
+
+
+@compiled
+def _log(columns: Columns, number: int, played: tuple[float, int, int]) -> None:
+    columns.totals[number], columns.steps[number], columns.endings[number] = played
 
 
 def _entry(function: F) -> F:
@@ -197,24 +148,32 @@ def _entry(function: F) -> F:
 
 @functools.cache
 def uncached(entry: Callable[..., int]) -> Callable[..., int]:
-    """An entry of its own for a process in which the cache on disk cannot be used."""
+    """Return an entry of its own for a process in which the cache on disk cannot be used."""
     function: Callable[..., int] = cast(Any, entry).py_func
     return compiled(function)
 
 
-def _make_learn_chunk(sources: str) -> Callable[..., int]:
+@functools.cache
+def learn_chunk(method: Any, reward: task.Reward) -> Callable[..., int]:
+    """Return the compiled loop that learns by a method, where this is the reward of a step."""
+    begin_episode, act = _compilable(method.begin_episode), _compilable(method.act)
+    after_step, after_episode = _compilable(method.after_step), _compilable(method.after_episode)
+    _compilable(reward)
+    sources = _sources(method, sys.modules[reward.__module__])
+
     def learn_chunk(
         physics: Physics,
+        rules: Rules,
         grid: Grid,
-        method: Method,
-        q: Table,
+        p: Any,
+        memory: Any,
         rngs: Rngs,
-        numbers: tuple[int, int],
+        numbers: tuple[int, int, int],
         most_steps: int,
         columns: Columns,
         scratch: Scratch,
     ) -> int:
-        """Learn from episodes `numbers[0]` to `numbers[1] - 1`, in `columns[number]` each.
+        """Learn from episodes `numbers[0]` to `numbers[1] - 1` of `numbers[2]` in all.
 
         Stops after the episode in which `most_steps` is reached, or where the physics diverge.
 
@@ -224,31 +183,42 @@ def _make_learn_chunk(sources: str) -> Callable[..., int]:
         _ = sources
         all_steps = 0
         for number in range(numbers[0], numbers[1]):
-            alpha = _linear(method.alpha, method.alpha_final, method.slope, number)
-            epsilon = _linear(method.epsilon, method.epsilon_final, method.slope, number)
-            rates = (alpha, epsilon)
-            if method.stepwise:
-                played = _learn_stepwise(physics, grid, method, q, rngs, rates, scratch)
-            else:
-                played = _learn_afterwards(physics, grid, method, q, rngs, rates, scratch)
-            total, steps, ending = played
-            columns.totals[number] = total
-            columns.steps[number] = steps
-            columns.endings[number] = ending
-            all_steps += steps
-            if ending == DIVERGED:
+            rates = begin_episode(p, memory, number, numbers[2])
+            played = _learn_episode(
+                act,
+                after_step,
+                after_episode,
+                reward,
+                physics,
+                rules,
+                grid,
+                p,
+                memory,
+                rates,
+                rngs,
+                scratch,
+            )
+            _log(columns, number, played)
+            all_steps += played[1]
+            if played[2] == DIVERGED:
                 return number
             scratch.finished[0] = number + 1
             if all_steps >= most_steps:
                 return number + 1
         return numbers[1]
 
-    return learn_chunk
+    return _entry(learn_chunk)
 
 
-def _make_play_chunk(sources: str) -> Callable[..., int]:
+@functools.cache
+def play_chunk(reward: task.Reward) -> Callable[..., int]:
+    """Return the compiled loop that plays, where this is the reward of a step."""
+    _compilable(reward)
+    sources = _sources(sys.modules[reward.__module__])
+
     def play_chunk(
         physics: Physics,
+        rules: Rules,
         grid: Grid,
         actions: npt.NDArray[np.int64],
         rng: np.random.Generator,
@@ -257,34 +227,41 @@ def _make_play_chunk(sources: str) -> Callable[..., int]:
         columns: Columns,
         failure: Floats,
     ) -> int:
-        """The same as `learn_chunk` without learning; `actions[row]` is taken."""
+        """Do the same as `learn_chunk` without learning; `actions[row]` is taken."""
         _ = sources
         all_steps = 0
         for number in range(numbers[0], numbers[1]):
-            total, steps, ending = _play(physics, grid, actions, rng, failure)
-            columns.totals[number] = total
-            columns.steps[number] = steps
-            columns.endings[number] = ending
-            all_steps += steps
-            if ending == DIVERGED:
+            played = _play_episode(reward, physics, rules, grid, actions, rng, failure)
+            _log(columns, number, played)
+            all_steps += played[1]
+            if played[2] == DIVERGED:
                 return number
             if all_steps >= most_steps:
                 return number + 1
         return numbers[1]
 
-    return play_chunk
+    return _entry(play_chunk)
 
 
-def _sources() -> str:
-    """A checksum of all that is compiled into the entries.
+_known: Final[set[FunctionType]] = set()
+
+
+def _compilable(function: Any) -> Any:
+    """Let compiled code call a plain function, and the plain functions that this one calls."""
+    if isinstance(function, FunctionType) and function not in _known:
+        _known.add(function)
+        register_jitable(function)
+        for name in function.__code__.co_names:
+            _compilable(function.__globals__.get(name))
+    return function
+
+
+def _sources(*modules: Any) -> str:
+    """Return a checksum of all that is compiled into an entry.
 
     Numba keeps what it compiled until the file of the entry changes, and would not see that another
     file did. A value that an entry closes over is part of the cache's key.
     """
-    modules = (cartpole_v1, discretizer, episodes, qlearning, schedules, stepping, task)
-    texts = "".join(inspect.getsource(module) for module in modules) + repr(LARGEST_SANE)
-    return hashlib.sha256(texts.encode()).hexdigest()
-
-
-learn_chunk = _entry(_make_learn_chunk(_sources()))
-play_chunk = _entry(_make_play_chunk(_sources()))
+    shared = (cartpole_v1, discretizer, episodes, schedules, stepping, action_values, experience)
+    texts = [inspect.getsource(module) for module in (*shared, *modules)]
+    return hashlib.sha256("".join([*texts, repr(LARGEST_SANE)]).encode()).hexdigest()

@@ -10,14 +10,16 @@ import numpy.typing as npt
 from mjcartpole.errors import SimulationError
 from mjcartpole.learning.discretizer import Discretizer
 from mjcartpole.learning.episodes import ENDINGS, Episode, ending_index
-from mjcartpole.learning.qlearning import TabularQ
+from mjcartpole.learning.learner import Learner
+from mjcartpole.learning.methods.experience import Trajectory, Transition
+from mjcartpole.task import CARTPOLE_V1
 
 State = npt.NDArray[np.float64]
 
 
 def learn_episodes(
     env: gymnasium.Env[Any, Any],
-    learner: TabularQ,
+    learner: Learner,
     discretizer: Discretizer,
     numbers: range,
 ) -> Iterator[Episode]:
@@ -26,78 +28,51 @@ def learn_episodes(
     Args:
         env: Any environment with CartPole-v1's spaces and an end to every episode; it draws its
             starting states from the generator that it has.
-        learner: Chooses actions, and learns after each step or each episode.
+        learner: Chooses actions, and learns after each step and each episode.
         discretizer: From observations to the learner's states.
         numbers: Which episodes, counted from 0: they decide what the schedules give.
 
     Raises:
         SimulationError: The physics diverged; names episode and step.
     """
-    learn = _learn_stepwise if learner.td_lambda is None else _learn_afterwards
     for number in numbers:
         observation, _ = env.reset()
-        learner.begin_episode(number)
-        yield learn(env, learner, discretizer, observation, number)
+        yield _learn_episode(env, learner, discretizer, observation, number)
 
 
-def _learn_stepwise(
+def _learn_episode(
     env: gymnasium.Env[Any, Any],
-    learner: TabularQ,
+    learner: Learner,
     discretizer: Discretizer,
     observation: npt.NDArray[np.float32],
     number: int,
 ) -> Episode:
-    """Learn after each step."""
-    act, update, step = learner.act, learner.update, env.step
-    learn_last_step = learner.learn_last_step
-    total, steps, over, terminated = 0.0, 0, False, False
+    method, p, rng, memory = learner.method, learner.p, learner.rng, learner.quick_memory()
+    act, after_step, step = method.act, method.after_step, env.step
+    rates = method.begin_episode(p, memory, number, learner.episodes)
     s = discretizer(observation.tolist())
-    try:
-        while not over:
-            a = act(s)
-            observation, r, terminated, truncated, _ = step(a)
-            over = terminated or truncated
-            s_next = discretizer(observation.tolist())
-            if learn_last_step or not over:
-                update(s, a, float(r), s_next, terminated)
-            total += float(r)
-            steps += 1
-            s = s_next
-    except SimulationError as error:
-        raise in_episode(error, number, steps) from error
-    return _ended(env, number, total, steps, terminated)
-
-
-def _learn_afterwards(
-    env: gymnasium.Env[Any, Any],
-    learner: TabularQ,
-    discretizer: Discretizer,
-    observation: npt.NDArray[np.float32],
-    number: int,
-) -> Episode:
-    """Play an episode, then learn from all of it."""
-    act, step = learner.act, env.step
-    states, actions, rewards = [discretizer(observation.tolist())], [], []
+    states, actions, rewards = [s], list[int](), list[float]()
     over = terminated = False
     try:
         while not over:
-            a = act(states[-1])
-            observation, r, terminated, truncated, _ = step(a)
-            over = terminated or truncated
+            a = act(p, memory, rates, s, rng)
+            observation, reward, terminated, truncated, _ = step(a)
+            r, over = float(reward), terminated or truncated
+            s_next = discretizer(observation.tolist())
+            after_step(p, memory, rates, Transition(s, a, r, s_next, terminated, over), rng)
+            states.append(s_next)
             actions.append(a)
-            rewards.append(float(r))
-            states.append(discretizer(observation.tolist()))
+            rewards.append(r)
+            s = s_next
     except SimulationError as error:
         raise in_episode(error, number, len(actions)) from error
-    if learner.learn_last_step:
-        learner.replay(states, actions, rewards, terminated)
-    else:
-        learner.replay(states[:-1], actions[:-1], rewards[:-1], over=False)
+    episode = Trajectory(states, actions, rewards, len(actions), terminated)
+    method.after_episode(p, memory, rates, episode, rng)
     return _ended(env, number, sum(rewards), len(actions), terminated)
 
 
 def in_episode(error: SimulationError, number: int, steps: int) -> SimulationError:
-    """The same error with where it happened.
+    """Return the same error with where it happened.
 
     Args:
         error: What went wrong.
@@ -142,7 +117,8 @@ def play_episode(
 def _ended(
     env: gymnasium.Env[Any, Any], number: int, total: float, steps: int, terminated: bool
 ) -> Episode:
-    ending = ENDINGS[ending_index(terminated, _state_of(env)[0])]
+    x_limit = getattr(env.unwrapped, "x_threshold", CARTPOLE_V1.x_limit)
+    ending = ENDINGS[ending_index(terminated, _state_of(env)[0], x_limit)]
     return Episode(number, total, steps, ending)
 
 

@@ -1,6 +1,5 @@
 """What a training is called: in a folder's name, and in the words of its flags."""
 
-import dataclasses
 import hashlib
 import os
 import re
@@ -72,12 +71,15 @@ def shortened(text: str, most: int) -> str:
 
 def _changed(preset: str, config: TrainConfig) -> dict[str, Any]:
     """The fields that are not as the preset has them, by name."""
-    base = TrainConfig(**PRESETS.get(preset, {}))
-    values = {field.name: getattr(config, field.name) for field in dataclasses.fields(config)}
+    # A folder may be of a preset that somebody called otherwise.
+    name = preset if preset in PRESETS else "tuned"
+    base = TrainConfig.preset(name, method=config.method).values()
+    base["method"] = TrainConfig.preset(name).method
+    values = config.values()
     return {
-        name: value
-        for name, value in values.items()
-        if name not in _ELSEWHERE and value != getattr(base, name)
+        name: values[name]
+        for name in values
+        if name not in _ELSEWHERE and values[name] != base[name]
     }
 
 
@@ -113,7 +115,7 @@ def _readable(changed: dict[str, Any]) -> Iterator[str]:
                 yield name + _number(value)
 
 
-def _flag(flag: str, value: Any) -> str:  # noqa: ANN401
+def _flag(flag: str, value: Any) -> str:
     match value:
         case bool():
             return f"--{flag}" if value else f"--no-{flag}"

@@ -5,7 +5,7 @@ model.xml       the model as it was, whole: it compiles to the same model anywhe
 asset-*         the meshes, textures and other files that it names, called by their content
 versions.json   Python, the platform and the packages
 config.json     the preset's name and the full config; with it a training can be continued
-checkpoint.bin  while it lasts: its state (see checkpoints.py), and checkpoint-previous.bin
+checkpoint.bin  while it lasts: its state (see checkpoints.py)
 episodes.csv    one line per training episode
 policy.json     the greedy policy (see policy.py)
 timing.json     how long it took: the one file that differs between equal runs
@@ -13,7 +13,6 @@ summary.json    what came out
 """
 
 import contextlib
-import dataclasses
 import fnmatch
 import json
 import os
@@ -25,13 +24,7 @@ from typing import Any, Final
 
 from mjcartpole.errors import RunError
 from mjcartpole.files import is_file, is_folder, is_temporary, names_in, remove, write_whole
-from mjcartpole.learning.checkpoints import (  # fmt: skip
-    LATEST,
-    PREVIOUS,
-    Checkpoint,
-    choose_checkpoint,
-    keep_only,
-)
+from mjcartpole.learning.checkpoints import FORMER, LATEST, Checkpoint, load_checkpoint
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.documents import CONFIG, SUMMARY, read_config, read_figures
 from mjcartpole.learning.folders import LOCK, held_folder, locked_folder
@@ -145,7 +138,7 @@ def claimed_folder(folder: Path, *, overwrite: bool = False) -> Iterator[None]:
         try:
             yield
         finally:
-            if not before and not {LATEST, PREVIOUS, *RESULTS} & content_of(folder):
+            if not before and not {LATEST, FORMER, *RESULTS} & content_of(folder):
                 _remove(folder, reversed(BEGINNING))
                 remove_assets(folder)
 
@@ -161,7 +154,7 @@ def begin_run(
     _remove_files(folder, keep=cartpole.stored[1])
     write_versions(folder)
     write_model(folder, cartpole)
-    about = {"preset": preset, "video": video, **dataclasses.asdict(config)}
+    about = {"preset": preset, "video": video, **config.values()}
     write_whole(folder / CONFIG, _json(about))
 
 
@@ -198,7 +191,7 @@ def write_summary(folder: Path, summary: dict[str, Any]) -> None:
 
 def finish_run(folder: Path) -> None:
     """Drop the checkpoints of a run that is complete."""
-    _remove(folder, (PREVIOUS, LATEST))
+    _remove(folder, (FORMER, LATEST))
 
 
 def remove_run(folder: Path) -> None:
@@ -218,7 +211,7 @@ def remove_run(folder: Path) -> None:
 def is_complete(folder: Path) -> bool:
     """Whether a folder holds a run to which nothing is left to do."""
     content = content_of(folder)
-    return {CONFIG, SUMMARY} <= content and not content & {LATEST, PREVIOUS}
+    return {CONFIG, SUMMARY} <= content and not content & {LATEST, FORMER}
 
 
 def has_events(folder: Path) -> bool:
@@ -266,13 +259,12 @@ def resumed_folder(path: Path, allow_assets: Sequence[Path] = ()) -> Iterator[Be
     """Hold the folder of a run that is to be continued.
 
     Args:
-        path: A run folder, for its latest checkpoint, or one checkpoint in it.
+        path: A run folder, for its own checkpoint, or another checkpoint in it.
         allow_assets: Other folders in which the files of its model may lie.
 
     Raises:
         RunError: There is no training to be continued, or another one is at work.
-        CheckpointError: The checkpoint is damaged or of another training; the message offers the
-            previous one, if that is good.
+        CheckpointError: The checkpoint is damaged or of another training.
         ModelError: The model was damaged.
     """
     folder = run_folder(path)
@@ -284,18 +276,17 @@ def resumed_folder(path: Path, allow_assets: Sequence[Path] = ()) -> Iterator[Be
         )
     _check_files(folder, content)
     with locked_folder(folder):
-        begun = _load_begun(folder, path, allow_assets)
-        if begun.checkpoint is not None:
-            # The one that was chosen is now the latest, and a damaged one takes no place again.
-            keep_only(folder, path if path != folder else folder / LATEST)
-        yield begun
+        yield _load_begun(folder, path, allow_assets)
 
 
 def _load_begun(folder: Path, path: Path, allow_assets: Sequence[Path]) -> Begun:
     preset, video, config = read_config(folder)
     document = read_document(folder)
     cartpole = stored_model(document, config, folder, allow_assets)
-    checkpoint = choose_checkpoint(folder, path, config, document, poles=cartpole.poles)
+    checkpoint = None
+    if path != folder or LATEST in content_of(folder):
+        file = path if path != folder else folder / LATEST
+        checkpoint = load_checkpoint(file, config, document, poles=cartpole.poles)
     return Begun(folder, preset, video, config, cartpole, checkpoint)
 
 
@@ -322,7 +313,7 @@ def _check_free(folder: Path, overwrite: bool) -> None:
     content = content_of(folder)
     # A training that was killed in its first moment leaves no config: nothing is lost with it.
     # A model alone is somebody's own: ours lies beside the versions.
-    killed = VERSIONS in content and content <= {MODEL, VERSIONS, LATEST, PREVIOUS}
+    killed = VERSIONS in content and content <= {MODEL, VERSIONS, LATEST, FORMER}
     if not content or killed:
         return
     _check_files(folder, content)
@@ -358,7 +349,7 @@ def _own(content: set[str]) -> list[str]:
     """Names of a run's files, those of `content` among them, in the order of their removal."""
     # The config first: without it a folder holds no run, so that two are never mixed.
     events = fnmatch.filter(content, EVENTS)
-    return [CONFIG, MODEL, *events, *RESULTS, LATEST, PREVIOUS, VERSIONS]
+    return [CONFIG, MODEL, *events, *RESULTS, LATEST, FORMER, VERSIONS]
 
 
 def _remove_files(folder: Path, keep: Iterable[str] = ()) -> None:

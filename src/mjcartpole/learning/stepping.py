@@ -1,8 +1,8 @@
 """One control step, its start and its end as compiled code: MuJoCo's own C step, or CartPole-v1's.
 
-There are three kinds of physics, and a function of each for everything that differs; Numba takes
-the one that fits. With one pole a state is a tuple of four floats, which costs no memory and no
-look-up; with several it is an array that the physics own.
+There are two kinds of physics, and a function of each for everything that differs; Numba takes
+the one that fits. A state is a tuple of four floats, which costs no memory and no look-up; those of
+several poles are read from MuJoCo's own arrays where all of them count.
 
 `mj_step` and `mj_resetData` are called in libmujoco by address-free linking, the one form that
 Numba can keep in a cache on disk.
@@ -10,7 +10,7 @@ Numba can keep in a cache on disk.
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Final, NamedTuple, TypeAlias, TypeVar, cast
+from typing import Any, NamedTuple, TypeAlias, TypeVar, cast
 
 import llvmlite.binding
 import numba
@@ -20,18 +20,30 @@ from numba import types
 from numba.extending import overload
 
 from mjcartpole import task
+from mjcartpole.learning.discretizer import Grid, row_of
 from mjcartpole.physics import cartpole_v1
 from mjcartpole.physics.simulation import FARTHEST_SANE, LARGEST_SANE
 
 Floats = npt.NDArray[np.float64]
 F = TypeVar("F", bound=Callable[..., Any])
 
-State: TypeAlias = Any
-"""`(x, x_dot, theta, theta_dot)` as a tuple; with several poles an array, shape (2 + 2 poles,)."""
+State: TypeAlias = tuple[float, float, float, float]
+"""`(x, x_dot, theta, theta_dot)`; of several poles, the largest sizes of the last two."""
+
+
+class Rules(NamedTuple):
+    """A `Task` as compiled code sees it, but for its reward."""
+
+    x_limit: float
+    theta_limit: float
+    low: float
+    width: float
+    """Starting values lie in [low, low + width)."""
+    time_limit: int
 
 
 class MujocoPhysics(NamedTuple):
-    """A `Simulation` of one pole, which must outlive this, as compiled code sees it."""
+    """A `Simulation`, which must outlive this, as compiled code sees it."""
 
     model: int
     """Address of the mjModel."""
@@ -40,8 +52,8 @@ class MujocoPhysics(NamedTuple):
     qpos: Floats
     qvel: Floats
     ctrl: Floats
-    slider: int
-    hinge: int
+    joints: npt.NDArray[np.int64]
+    """Of the cart, then of each pole, shape (1 + poles,)."""
     left: float
     right: float
     """Controls of the two actions."""
@@ -49,25 +61,6 @@ class MujocoPhysics(NamedTuple):
     substeps: int
     explicit: bool
     """Whether positions move by the old velocities (integrator `gym`)."""
-
-
-class PolesPhysics(NamedTuple):
-    """The same with several poles."""
-
-    model: int
-    data: int
-    qpos: Floats
-    qvel: Floats
-    ctrl: Floats
-    joints: npt.NDArray[np.int64]
-    """Of the cart, then of each pole, shape (1 + poles,)."""
-    left: float
-    right: float
-    timestep: float
-    substeps: int
-    explicit: bool
-    state: Floats
-    """Memory for the state, shape (2 + 2 poles,)."""
     seen: Floats
     """Memory for the observation, shape (2 + 2 poles,)."""
     moved: Floats
@@ -82,7 +75,7 @@ class GymPhysics(NamedTuple):
     """N."""
 
 
-Physics: TypeAlias = MujocoPhysics | PolesPhysics | GymPhysics
+Physics: TypeAlias = MujocoPhysics | GymPhysics
 AnyPhysics: TypeAlias = Any
 """One of them, where Numba is to see one name for all."""
 
@@ -106,99 +99,59 @@ def compiled(function: F) -> F:
     return cast(F, jitted)
 
 
-_has_terminated = compiled(task.has_terminated)
-_farthest = compiled(task.max_abs)
+_max_abs = compiled(task.max_abs)
+_row_of = compiled(row_of)
 _cartpole_v1_step = compiled(cartpole_v1.cartpole_v1_step)
 
 _mj_step = types.ExternalFunction("mj_step", types.void(types.intp, types.intp))
 _mj_reset = types.ExternalFunction("mj_resetData", types.void(types.intp, types.intp))
 
 
-# --- draw a starting state ----------------------------------------------------------------------
+def _for_each(mujoco: F, gym: F) -> Callable[[F], F]:
+    """Let Numba take one function or the other for a stub, by the physics: its first argument."""
+
+    def register(stub: F) -> F:
+        @overload(stub, strict=False)
+        def choose(physics: AnyPhysics, *others: object) -> F:
+            return mujoco if physics.instance_class is MujocoPhysics else gym
+
+        return stub
+
+    return register
 
 
-def draw_start(physics: AnyPhysics, rng: np.random.Generator) -> State:
-    """A starting state: `Generator.uniform` draws and computes each value like this."""
-    raise NotImplementedError  # Numba takes one of those below.
+# --- draw a starting state, and put a cart-pole there -------------------------------------------
 
 
-_LOW: Final = task.RESET_LOW
-_WIDTH: Final = task.RESET_HIGH - task.RESET_LOW
+def _begin_mujoco(physics: AnyPhysics, rules: Rules, rng: np.random.Generator) -> State:
+    _mj_reset(physics.model, physics.data)
+    for joint in physics.joints:
+        physics.qpos[joint] = rules.low + rules.width * rng.random()
+        physics.qvel[joint] = rules.low + rules.width * rng.random()
+    return _as_one_pole(physics)
 
 
-def _draw_one_pole(physics: AnyPhysics, rng: np.random.Generator) -> State:
-    x = _LOW + _WIDTH * rng.random()
-    x_dot = _LOW + _WIDTH * rng.random()
-    theta = _LOW + _WIDTH * rng.random()
-    theta_dot = _LOW + _WIDTH * rng.random()
+def _begin_gym(physics: AnyPhysics, rules: Rules, rng: np.random.Generator) -> State:
+    x = rules.low + rules.width * rng.random()
+    x_dot = rules.low + rules.width * rng.random()
+    theta = rules.low + rules.width * rng.random()
+    theta_dot = rules.low + rules.width * rng.random()
     return x, x_dot, theta, theta_dot
 
 
-def _draw_poles(physics: AnyPhysics, rng: np.random.Generator) -> State:
-    state = physics.state
-    for index in range(len(state)):
-        state[index] = _LOW + _WIDTH * rng.random()
-    return state
+@_for_each(_begin_mujoco, _begin_gym)
+def begin(physics: AnyPhysics, rules: Rules, rng: np.random.Generator) -> State:
+    """Return a starting state, in which the cart-pole is put; nothing of its past remains.
 
-
-@overload(draw_start)
-def _choose_draw(physics: AnyPhysics, rng: np.random.Generator) -> Callable[..., State]:
-    return _draw_poles if physics.instance_class is PolesPhysics else _draw_one_pole
-
-
-# --- put a cart-pole there ----------------------------------------------------------------------
-
-
-def begin(physics: AnyPhysics, state: State) -> None:
-    """Put a cart-pole into a state; nothing of its past remains."""
-    raise NotImplementedError
-
-
-def _begin_mujoco(physics: AnyPhysics, state: State) -> None:
-    _mj_reset(physics.model, physics.data)
-    physics.qpos[physics.slider], physics.qvel[physics.slider] = state[0], state[1]
-    physics.qpos[physics.hinge], physics.qvel[physics.hinge] = state[2], state[3]
-
-
-def _begin_poles(physics: AnyPhysics, state: State) -> None:
-    _mj_reset(physics.model, physics.data)
-    for index, joint in enumerate(physics.joints):
-        physics.qpos[joint], physics.qvel[joint] = state[2 * index], state[2 * index + 1]
-
-
-def _begin_gym(physics: AnyPhysics, state: State) -> None:
-    pass
-
-
-@overload(begin)
-def _choose_begin(physics: AnyPhysics, state: State) -> Callable[..., None]:
-    kind = {MujocoPhysics: _begin_mujoco, PolesPhysics: _begin_poles, GymPhysics: _begin_gym}
-    return kind[physics.instance_class]
+    `Generator.uniform` draws and computes each value like this.
+    """
+    raise NotImplementedError  # Numba takes one of those above; so below.
 
 
 # --- move it ------------------------------------------------------------------------------------
 
 
-def advance(physics: AnyPhysics, state: State, action: int) -> State:
-    """The state one control step later."""
-    raise NotImplementedError
-
-
 def _advance_mujoco(physics: AnyPhysics, state: State, action: int) -> State:
-    qpos, qvel, h = physics.qpos, physics.qvel, physics.timestep
-    slider, hinge = physics.slider, physics.hinge
-    physics.ctrl[0] = physics.right if action == 1 else physics.left
-    for _ in range(physics.substeps):
-        x = qpos[slider] + h * qvel[slider]
-        theta = qpos[hinge] + h * qvel[hinge]
-        _mj_step(physics.model, physics.data)
-        if physics.explicit:
-            qpos[slider] = x
-            qpos[hinge] = theta
-    return qpos[slider], qvel[slider], qpos[hinge], qvel[hinge]
-
-
-def _advance_poles(physics: AnyPhysics, state: State, action: int) -> State:
     qpos, qvel, h = physics.qpos, physics.qvel, physics.timestep
     joints, moved = physics.joints, physics.moved
     physics.ctrl[0] = physics.right if action == 1 else physics.left
@@ -209,9 +162,7 @@ def _advance_poles(physics: AnyPhysics, state: State, action: int) -> State:
         if physics.explicit:
             for index, joint in enumerate(joints):
                 qpos[joint] = moved[index]
-    for index, joint in enumerate(joints):
-        state[2 * index], state[2 * index + 1] = qpos[joint], qvel[joint]
-    return state
+    return _as_one_pole(physics)
 
 
 def _advance_gym(physics: AnyPhysics, state: State, action: int) -> State:
@@ -219,67 +170,83 @@ def _advance_gym(physics: AnyPhysics, state: State, action: int) -> State:
     return _cartpole_v1_step(state[0], state[1], state[2], state[3], force)
 
 
-@overload(advance)
-def _choose_advance(physics: AnyPhysics, state: State, action: int) -> Callable[..., State]:
-    kind = {MujocoPhysics: _advance_mujoco, PolesPhysics: _advance_poles, GymPhysics: _advance_gym}
-    return kind[physics.instance_class]
+@_for_each(_advance_mujoco, _advance_gym)
+def advance(physics: AnyPhysics, state: State, action: int) -> State:
+    """Return the state one control step later."""
+    raise NotImplementedError
+
+
+@compiled
+def _as_one_pole(physics: AnyPhysics) -> State:
+    joints, qpos, qvel = physics.joints, physics.qpos, physics.qvel
+    theta, theta_dot = qpos[joints[1]], qvel[joints[1]]
+    if len(joints) > 2:
+        theta, theta_dot = _max_abs(qpos[joints[1:]]), _max_abs(qvel[joints[1:]])
+    return qpos[joints[0]], qvel[joints[0]], theta, theta_dot
 
 
 # --- look at it ---------------------------------------------------------------------------------
 
 
-def observe(physics: AnyPhysics, state: State) -> State:
-    """The float32 observation, as plain floats again."""
+def _row_mujoco(physics: AnyPhysics, state: State, grid: Grid) -> int:
+    if len(physics.joints) == 2:
+        return _row_of(_rounded(state), grid)
+    for index, joint in enumerate(physics.joints):
+        physics.seen[2 * index] = np.float64(np.float32(physics.qpos[joint]))
+        physics.seen[2 * index + 1] = np.float64(np.float32(physics.qvel[joint]))
+    return _row_of(physics.seen, grid)
+
+
+def _row_gym(physics: AnyPhysics, state: State, grid: Grid) -> int:
+    return _row_of(_rounded(state), grid)
+
+
+@_for_each(_row_mujoco, _row_gym)
+def row(physics: AnyPhysics, state: State, grid: Grid) -> int:
+    """Return the table's row of the float32 observation."""
     raise NotImplementedError
 
 
-def _observe_one_pole(physics: AnyPhysics, state: State) -> State:
+@compiled
+def _rounded(state: State) -> State:
     x, x_dot = np.float64(np.float32(state[0])), np.float64(np.float32(state[1]))
     theta, theta_dot = np.float64(np.float32(state[2])), np.float64(np.float32(state[3]))
     return x, x_dot, theta, theta_dot
 
 
-def _observe_poles(physics: AnyPhysics, state: State) -> State:
-    seen = physics.seen
-    for index in range(len(state)):
-        seen[index] = np.float64(np.float32(state[index]))
-    return seen
-
-
-@overload(observe)
-def _choose_observe(physics: AnyPhysics, state: State) -> Callable[..., State]:
-    return _observe_poles if physics.instance_class is PolesPhysics else _observe_one_pole
-
-
-def is_over(physics: AnyPhysics, state: State) -> bool:
-    """Whether the rules end the episode, or a state gone wild does, as in the environment."""
-    raise NotImplementedError
-
-
 @compiled
-def _is_over(x: float, x_dot: float, theta: float, theta_dot: float) -> bool:
+def is_over(rules: Rules, state: State) -> bool:
+    """Return whether the rules end the episode, or a state gone wild does, as in the env."""
+    x, x_dot, theta, theta_dot = state
+    has_ended = abs(x) > rules.x_limit or abs(theta) > rules.theta_limit
     is_number = (x - theta) * 0.0 == 0.0
     is_sane = -FARTHEST_SANE < x_dot - theta_dot < FARTHEST_SANE
-    return _has_terminated(x, theta) or not is_number or not is_sane
-
-
-def _is_over_one_pole(physics: AnyPhysics, state: State) -> bool:
-    return _is_over(state[0], state[1], state[2], state[3])
-
-
-def _is_over_poles(physics: AnyPhysics, state: State) -> bool:
-    return _is_over(state[0], state[1], _farthest(state[2::2]), _farthest(state[3::2]))
-
-
-@overload(is_over)
-def _choose_is_over(physics: AnyPhysics, state: State) -> Callable[..., bool]:
-    return _is_over_poles if physics.instance_class is PolesPhysics else _is_over_one_pole
+    return has_ended or not is_number or not is_sane
 
 
 @compiled
 def has_diverged(state: State) -> bool:
-    """Whether a value is NaN, or beyond what MuJoCo calls sane."""
+    """Return whether a value is NaN, or beyond what MuJoCo calls sane."""
     sane = True
     for value in state:
         sane &= -LARGEST_SANE < value < LARGEST_SANE
     return not sane
+
+
+def _note_mujoco(physics: AnyPhysics, state: State, steps: int, failure: Floats) -> None:
+    failure[0] = steps
+    for index, joint in enumerate(physics.joints):
+        failure[1 + 2 * index] = physics.qpos[joint]
+        failure[2 + 2 * index] = physics.qvel[joint]
+
+
+def _note_gym(physics: AnyPhysics, state: State, steps: int, failure: Floats) -> None:
+    failure[0] = steps
+    for index, value in enumerate(state):
+        failure[1 + index] = value
+
+
+@_for_each(_note_mujoco, _note_gym)
+def note(physics: AnyPhysics, state: State, steps: int, failure: Floats) -> None:
+    """Keep the state of a cart-pole that diverged, and after how many steps it did."""
+    raise NotImplementedError

@@ -33,14 +33,14 @@ Fields = Mapping[str, Kind]
 
 
 def read_document(
-    path: Path, fields: Fields, make: Callable[[dict[str, Any]], Made], otherwise: str
+    path: Path, fields: Fields | None, make: Callable[[dict[str, Any]], Made], otherwise: str
 ) -> Made:
-    """What a file of a run folder stands for.
+    """Return what a file of a run folder stands for.
 
     Args:
         path: The file.
-        fields: What it holds.
-        make: Makes what it stands for from them, or raises ValueError.
+        fields: What it holds; None leaves that to `make`.
+        make: Makes what it stands for from the values, or raises ValueError.
         otherwise: What is said of a file that does not stand for it.
 
     Raises:
@@ -48,12 +48,13 @@ def read_document(
     """
     content = read_bytes(path, MOST_BYTES, refusal=RunError)
     try:
-        return make(checked(parse(content), fields))
+        values = parse(content)
+        return make(values if fields is None else checked(values, fields))
     except ValueError as error:
         raise RunError(f"'{path}' {otherwise}: {brief(error)}") from error
 
 
-def parse(content: bytes) -> Any:  # noqa: ANN401
+def parse(content: bytes) -> Any:
     """The value that JSON stands for.
 
     Raises:
@@ -73,7 +74,7 @@ def parse(content: bytes) -> Any:  # noqa: ANN401
         raise ValueError("its values are nested too deep") from None
 
 
-def checked(values: Any, fields: Fields) -> dict[str, Any]:  # noqa: ANN401
+def checked(values: Any, fields: Fields) -> dict[str, Any]:
     """The values, if they are what the fields ask for.
 
     Raises:

@@ -9,7 +9,7 @@ import numpy as np
 
 from mjcartpole.errors import ConfigError
 from mjcartpole.files import atomic_write
-from mjcartpole.learning.schedules import LinearSchedule
+from mjcartpole.learning.learner import Learner
 from mjcartpole.learning.training import TrainResult
 
 NAME: Final = "events.out.tfevents.0.mjcartpole"
@@ -30,7 +30,7 @@ def check_installed() -> None:
 
 
 def write_events(folder: Path, result: TrainResult) -> None:
-    """Write return, step size and exploration per episode, in place of events that are there.
+    """Write the return and the method's rates per episode, in place of events that are there.
 
     Raises:
         ConfigError: tensorboardX is not installed.
@@ -41,10 +41,8 @@ def write_events(folder: Path, result: TrainResult) -> None:
     from tensorboardX.record_writer import RecordWriter  # noqa: PLC0415
     from tensorboardX.summary import scalar  # noqa: PLC0415
 
-    config, returns = result.config, result.returns
-    slope = config.decay * config.episodes
-    alpha = LinearSchedule(config.alpha, config.alpha_final, slope)
-    epsilon = LinearSchedule(config.epsilon, config.epsilon_final, slope)
+    learner, returns = Learner(result.config, 1), result.returns
+    begin_episode = learner.method.begin_episode
     with (
         atomic_write(folder / NAME) as temporary,
         contextlib.closing(RecordWriter(str(temporary))) as writer,
@@ -54,10 +52,9 @@ def write_events(folder: Path, result: TrainResult) -> None:
             if not block.size:
                 continue
             number = int(block[-1])
-            for name, value in (
-                ("train/return", float(returns[block].mean())),
-                ("train/alpha", alpha(number)),
-                ("train/epsilon", epsilon(number)),
-            ):
-                event = Event(wall_time=0, step=number + 1, summary=scalar(name, value))
+            rates = begin_episode(learner.p, learner.memory, number, learner.episodes)
+            values = {"return": float(returns[block].mean())} | rates._asdict()
+            for name, value in values.items():
+                summary = scalar(f"train/{name}", value)
+                event = Event(wall_time=0, step=number + 1, summary=summary)
                 writer.write(event.SerializeToString())

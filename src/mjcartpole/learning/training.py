@@ -3,7 +3,7 @@
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Any, Final
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -15,14 +15,10 @@ from mjcartpole.envs.backend import make_env
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.engine import Engine, check_engine, choose_engine
 from mjcartpole.learning.episodes import Columns, EpisodeLog
+from mjcartpole.learning.learner import Learner
 from mjcartpole.learning.loop import learn_episodes
 from mjcartpole.learning.policy import Policy
-from mjcartpole.learning.qlearning import TabularQ
-from mjcartpole.learning.schedules import LinearSchedule
 from mjcartpole.physics.load import CartPole
-
-LEARNER_STREAM: Final = 1
-"""Spawn key of the learner's generator: its draws are independent of the env's."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -65,14 +61,14 @@ class Snapshot:
     """All that a training needs to go on, between two episodes.
 
     Attributes:
-        q_table: The table, shape (n_states, 2).
+        memory: All that the learner has learned: flat arrays by name.
         env_rng: State of the generator that draws starting states.
         learner_rng: State of the learner's generator.
         columns: The episodes so far, see `EpisodeLog`.
         seconds: Time they took.
     """
 
-    q_table: npt.NDArray[np.float64] = field(repr=False)
+    memory: dict[str, npt.NDArray[Any]] = field(repr=False)
     env_rng: dict[str, Any] = field(repr=False)
     learner_rng: dict[str, Any] = field(repr=False)
     columns: Columns = field(repr=False)
@@ -120,7 +116,7 @@ class Training:
         elif cartpole is None and env is None:
             cartpole = config.load_model()
         self.discretizer = config.discretizer(_count_poles(cartpole, env))
-        self.learner = _make_learner(config, self.discretizer.n_states)
+        self.learner = Learner(config, self.discretizer.n_states)
         self.log = EpisodeLog(config.episodes)
         self._env_rng, _ = seeding.np_random(config.seed)
         self._seconds = 0.0
@@ -128,7 +124,7 @@ class Training:
         if env is not None:
             self._env = env
             return
-        physics = (config.backend, cartpole or config.model, config.integrator)
+        physics = (config.backend, cartpole or config.model, config.integrator, config.rules)
         self.engine = choose_engine(engine, config.backend, cartpole)
         if self.engine == "compiled":
             from mjcartpole.learning.compiled import CompiledLoop  # noqa: PLC0415 - it is heavy
@@ -167,7 +163,8 @@ class Training:
 
     def result(self) -> TrainResult:
         """What has been learned so far; later episodes do not change it."""
-        table = self.learner.q_table.reshape(*self.discretizer.bins, task.N_ACTIONS).copy()
+        values = self.learner.greedy_values
+        table = values.reshape(*self.discretizer.bins, task.N_ACTIONS).copy()
         return TrainResult(
             config=self.config,
             policy=Policy(self.discretizer, table),
@@ -178,7 +175,7 @@ class Training:
     def snapshot(self) -> Snapshot:
         """All that is needed to go on from here; later episodes do not change it."""
         return Snapshot(
-            q_table=self.learner.q_table.copy(),
+            memory={name: a.copy() for name, a in self.learner.memory._asdict().items()},
             env_rng=dict(self._env_rng.bit_generator.state),
             learner_rng=dict(self.learner.rng.bit_generator.state),
             columns=self.log.copy().columns,
@@ -187,7 +184,8 @@ class Training:
 
     def restore(self, snapshot: Snapshot) -> None:
         """Go on from a snapshot of a training with the same config."""
-        self.learner.q_table[:] = snapshot.q_table
+        for name, array in snapshot.memory.items():
+            getattr(self.learner.memory, name)[:] = array
         self._env_rng.bit_generator.state = snapshot.env_rng
         self.learner.rng.bit_generator.state = snapshot.learner_rng
         self.log = EpisodeLog.of(snapshot.columns, self.config.episodes)
@@ -223,20 +221,3 @@ def _count_poles(cartpole: CartPole | None, env: gymnasium.Env[Any, Any] | None)
         assert env.observation_space.shape is not None
         return env.observation_space.shape[0] // 2 - 1
     return 1 if cartpole is None else cartpole.poles
-
-
-def _make_learner(config: TrainConfig, n_states: int) -> TabularQ:
-    slope = config.decay * config.episodes
-    stream = np.random.SeedSequence(config.seed, spawn_key=(LEARNER_STREAM,))
-    rng = np.random.default_rng(stream)
-    shape = (n_states, task.N_ACTIONS)
-    return TabularQ(
-        rng.uniform(config.q_init_low, config.q_init_high, size=shape),
-        gamma=config.gamma,
-        alpha=LinearSchedule(config.alpha, config.alpha_final, slope),
-        epsilon=LinearSchedule(config.epsilon, config.epsilon_final, slope),
-        ties=config.ties,
-        learn_last_step=config.learn_last_step,
-        td_lambda=config.td_lambda,
-        rng=rng,
-    )

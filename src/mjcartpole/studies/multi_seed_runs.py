@@ -9,7 +9,6 @@ aggregate.json  statistics over the seeds
 """
 
 import contextlib
-import dataclasses
 import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -20,7 +19,7 @@ from mjcartpole.errors import RunError
 from mjcartpole.files import is_file, remove, write_whole
 from mjcartpole.learning import runs
 from mjcartpole.learning.config import TrainConfig
-from mjcartpole.learning.documents import read_config
+from mjcartpole.learning.documents import read_config, read_values
 from mjcartpole.learning.folders import SEEDS, check_here, held_folder, locked_folder
 from mjcartpole.learning.run_model import MODEL, read_model, remove_assets, write_model
 from mjcartpole.learning.stored import Fields, read_document
@@ -31,7 +30,7 @@ TABLE, AGGREGATE = "seeds.csv", "aggregate.json"
 FILES: Final = (SEEDS, TABLE, AGGREGATE, MODEL, runs.VERSIONS)
 """In the order of removal: without the seeds a folder holds nothing, and the versions say whose."""
 
-_FIELDS: Final[Fields] = {"preset": str, "seeds": tuple[int, ...], "config": TrainConfig.fields()}
+_FIELDS: Final[Fields] = {"preset": str, "seeds": tuple[int, ...], "config": dict}
 
 
 @dataclass(frozen=True)
@@ -101,7 +100,7 @@ def begin_seeds(
     """
     runs.write_versions(folder)
     write_model(folder, cartpole)
-    about = {"preset": preset, "seeds": list(seeds), "config": dataclasses.asdict(config)}
+    about = {"preset": preset, "seeds": list(seeds), "config": config.values()}
     write_whole(folder / SEEDS, json.dumps(about, indent=2) + "\n")
 
 
@@ -181,7 +180,7 @@ def _read_seeds(folder: Path) -> tuple[str, TrainConfig, tuple[int, ...]]:
     """Preset, config and seeds."""
 
     def made(about: dict[str, Any]) -> tuple[str, TrainConfig, tuple[int, ...]]:
-        config = TrainConfig(**about["config"])
+        config = read_values(about["config"])
         return about["preset"], config, check_seeds(config, about["seeds"])
 
     otherwise = "does not name the seeds of a run, or is damaged"

@@ -13,6 +13,7 @@ from mjcartpole.physics import equations, linear
 from mjcartpole.studies.parity.case import Batch, Subject, Vector
 from mjcartpole.studies.parity.dynamics import EPS, LEAST_ARM, STEP_BOUNDS, beyond_result, step_unit
 from mjcartpole.studies.parity.result import Figure, Result
+from mjcartpole.task import CARTPOLE_V1
 
 HORIZON = 400
 
@@ -190,7 +191,7 @@ def _play(env: gymnasium.Env[Any, Any], subject: Subject, seed: int) -> Played:
         observation, _, terminated, truncated, _ = env.step(actions[-1])
         over = terminated or truncated
     x = float(env.unwrapped.state[0])  # type: ignore[attr-defined]
-    return actions, ENDINGS[ending_index(terminated, x)]
+    return actions, ENDINGS[ending_index(terminated, x, CARTPOLE_V1.x_limit)]
 
 
 def _ks(a: list[int], b: list[int]) -> float:

@@ -1,0 +1,48 @@
+"""A learner: a method at work, with its parameters, its memory and its generator."""
+
+from typing import Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from mjcartpole.learning.config import TrainConfig
+from mjcartpole.learning.methods import method_named
+from mjcartpole.learning.methods.parameters import numbers_of
+
+STREAM: Final = 1
+"""Spawn key of the learner's generator: its draws are independent of the env's."""
+
+
+class Learner:
+    """What learns in a training.
+
+    Attributes:
+        method: The functions of the method.
+        p: Its parameters as numbers.
+        memory: A NamedTuple of flat arrays, which are changed in place.
+        rng: The learner's own generator.
+        episodes: How many episodes the whole training has: schedules need it.
+    """
+
+    def __init__(self, config: TrainConfig, n_states: int) -> None:
+        """Begin with what has learned nothing.
+
+        Args:
+            config: What is trained.
+            n_states: Rows of the table.
+        """
+        self.method: Any = method_named(config.method)
+        self.p = numbers_of(config, self.method.Numbers)
+        self.rng = np.random.default_rng(np.random.SeedSequence(config.seed, spawn_key=(STREAM,)))
+        self.memory = self.method.make_memory(self.p, n_states, self.rng)
+        self.episodes = config.episodes
+
+    @property
+    def greedy_values(self) -> npt.NDArray[np.float64]:
+        """Values of both actions, shape (n_states, 2), by which a policy decides."""
+        values: npt.NDArray[np.float64] = self.method.greedy_values(self.memory)
+        return values
+
+    def quick_memory(self) -> Any:
+        """Return views of the memory that Python reads several times faster than arrays."""
+        return type(self.memory)(*(array.data for array in self.memory))

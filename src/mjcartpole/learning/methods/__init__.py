@@ -1,0 +1,71 @@
+"""Learning methods: how a table learns, one file each.
+
+A method is a module of plain functions over numbers and arrays. The Python engine calls them, the
+compiled engine compiles them as they are, so they use what Numba knows: arithmetic, loops, other
+functions of this package, and the draws of a `numpy.random.Generator`. `Method` says which.
+"""
+
+from typing import Any, Final, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from mjcartpole.errors import ConfigError
+from mjcartpole.learning.methods import expected_sarsa, q_learning, sarsa
+from mjcartpole.learning.methods.experience import Trajectory, Transition
+from mjcartpole.learning.methods.parameters import Parameters
+
+
+class Method(Protocol):
+    """What the module of a method has.
+
+    In each function `p` is a `Numbers`, `memory` is what `make_memory` made, `rates` what
+    `begin_episode` returned, and `rng` the learner's generator.
+    """
+
+    Parameters: type[Parameters]
+    """A frozen dataclass: each field has a default, and a docstring that is the flag's help."""
+    Numbers: Any
+    """The same for the functions: `numbers_class(Parameters, __name__)`."""
+
+    def make_memory(self, p: Any, n_states: int, rng: np.random.Generator) -> Any:
+        """Return a NamedTuple of flat arrays: all that learning changes."""
+
+    def begin_episode(self, p: Any, memory: Any, number: int, episodes: int) -> Any:
+        """Return a NamedTuple of what holds during one of so many episodes, counted from 0."""
+
+    def act(self, p: Any, memory: Any, rates: Any, s: int, rng: np.random.Generator) -> int:
+        """Return the action in a state, a row of the table."""
+
+    def after_step(
+        self, p: Any, memory: Any, rates: Any, step: Transition, rng: np.random.Generator
+    ) -> None:
+        """Learn from one step."""
+
+    def after_episode(
+        self, p: Any, memory: Any, rates: Any, episode: Trajectory, rng: np.random.Generator
+    ) -> None:
+        """Learn from a whole episode."""
+
+    def greedy_values(self, memory: Any) -> npt.NDArray[np.float64]:
+        """Return the values of both actions, shape (n_states, 2), by which a policy decides."""
+
+
+METHODS: Final[dict[str, Any]] = {
+    "q-learning": q_learning,
+    "sarsa": sarsa,
+    "expected-sarsa": expected_sarsa,
+}
+"""Every method by its name; each value is a `Method`."""
+
+
+def method_named(name: str) -> Method:
+    """Return the method of a name.
+
+    Raises:
+        ConfigError: There is none.
+    """
+    if name not in METHODS:
+        raise ConfigError(f"method {name!r} is unknown; available: {', '.join(METHODS)}")
+    method: Method = METHODS[name]
+    return method

@@ -1,0 +1,143 @@
+"""Action values: what all methods share whose memory is one table Q(s, a).
+
+The table is flat: the values of state s are at 2 s and 2 s + 1.
+"""
+
+from dataclasses import dataclass
+from typing import Any, Literal, NamedTuple, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from mjcartpole.errors import ConfigError
+from mjcartpole.learning.discretizer import is_finite
+from mjcartpole.learning.methods.experience import Trajectory
+from mjcartpole.learning.methods.parameters import Parameters
+from mjcartpole.learning.schedules import linear
+from mjcartpole.task import N_ACTIONS
+
+Ties = Literal["first", "random"]
+"""What to do between two actions of equal value: take action 0, or draw one."""
+
+Table: TypeAlias = "memoryview[float] | npt.NDArray[np.float64]"
+"""A flat table, shape (2 n_states,): the compiled loop has the array, Python a quicker view."""
+
+IntMemory: TypeAlias = "memoryview[int] | npt.NDArray[np.int64]"
+"""Whole numbers that a method keeps."""
+
+
+class Rates(NamedTuple):
+    """What holds during one episode."""
+
+    alpha: float
+    """Step size."""
+    epsilon: float
+    """Probability of a random action."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ActionValueParameters(Parameters):
+    """Discount, step size, exploration and the first table."""
+
+    gamma: float = 0.98
+    """Discount per step."""
+    alpha: float = 0.1
+    """Step size at the start."""
+    alpha_final: float = 0.01
+    """Step size once decayed."""
+    epsilon: float = 1.0
+    """Probability of a random action at the start."""
+    epsilon_final: float = 0.01
+    """Probability of a random action once decayed."""
+    decay: float = 0.5
+    """Share of the episodes over which alpha and epsilon fall, linearly."""
+    q_init_low: float = 10.0
+    """The table starts uniformly random between this …"""
+    q_init_high: float = 10.0
+    """… and this."""
+    ties: Ties = "first"
+    """Between equal values: the first action, or a random one."""
+    learn_last_step: bool = True
+    """Learn from the step that ends an episode (the article's code does not)."""
+
+    def check_parameters(self) -> None:
+        """Refuse values that make no sense.
+
+        Raises:
+            ConfigError: See above.
+        """
+        self._check_shares("gamma", "alpha", "alpha_final", "epsilon", "epsilon_final", "decay")
+        self._check_one_of("ties", ("first", "random"))
+        low, high = self.q_init_low, self.q_init_high
+        if not (is_finite(low) and is_finite(high) and low <= high and is_finite(high - low)):
+            raise ConfigError(
+                "q_init_low and q_init_high must be finite, in order and not too far apart, "
+                f"not {low!r} and {high!r}"
+            )
+
+
+class QTable(NamedTuple):
+    """The memory of a method that learns one table."""
+
+    q_table: Table
+
+
+def draw_table(p: Any, n_states: int, rng: np.random.Generator) -> npt.NDArray[np.float64]:
+    """Return a first table, flat, drawn uniformly from `q_init_low` to `q_init_high`."""
+    return rng.uniform(p.q_init_low, p.q_init_high, size=n_states * N_ACTIONS)
+
+
+def make_memory(p: Any, n_states: int, rng: np.random.Generator) -> QTable:
+    """Return a table to begin with."""
+    return QTable(draw_table(p, n_states, rng))
+
+
+def begin_episode(p: Any, memory: Any, number: int, episodes: int) -> Rates:
+    """Return step size and exploration of an episode, counted from 0."""
+    slope = p.decay * episodes
+    alpha = linear(p.alpha, p.alpha_final, slope, number)
+    return Rates(alpha, linear(p.epsilon, p.epsilon_final, slope, number))
+
+
+def greedy_values(memory: Any) -> npt.NDArray[np.float64]:
+    """Return the table, shape (n_states, 2)."""
+    return np.asarray(memory.q_table).reshape(-1, N_ACTIONS)
+
+
+def choose(q: Table, s: int, epsilon: float, ties: int, rng: np.random.Generator) -> int:
+    """Return an action: random with probability epsilon, else the better one.
+
+    Args:
+        q: Action values.
+        s: The state.
+        epsilon: Probability of a random action.
+        ties: 0 takes the first of two equal actions, 1 draws one.
+        rng: Gives one number, and one more for a random action.
+    """
+    if rng.random() < epsilon:
+        return int(rng.random() * N_ACTIONS)
+    left, right = q[2 * s], q[2 * s + 1]
+    if left == right and ties == 1:
+        return int(rng.random() * N_ACTIONS)
+    return 1 if right > left else 0
+
+
+def act(p: Any, memory: Any, rates: Rates, s: int, rng: np.random.Generator) -> int:
+    """Return the epsilon-greedy action in a state."""
+    return choose(memory.q_table, s, rates.epsilon, p.ties, rng)
+
+
+def best(q: Table, s: int) -> float:
+    """Return the value of the better action in a state."""
+    return max(q[2 * s], q[2 * s + 1])
+
+
+def move_towards(q: Table, s: int, a: int, target: float, alpha: float) -> None:
+    """Move the value of one action towards its target: Q(s, a) <- Q(s, a) + alpha (target - …)."""
+    q[2 * s + a] += alpha * (target - q[2 * s + a])
+
+
+def learn_no_more(
+    p: Any, memory: Any, rates: Any, episode: Trajectory, rng: np.random.Generator
+) -> None:
+    """Leave an episode as it was learned step by step: `after_episode` of methods that do so."""

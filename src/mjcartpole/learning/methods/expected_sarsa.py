@@ -1,0 +1,54 @@
+"""Expected SARSA: learns the mean over the next action instead of one that is drawn.
+
+Van Seijen, van Hasselt, Whiteson and Wiering (2009), doi:10.1109/ADPRL.2009.4927542; Sutton and
+Barto (2018), section 6.6:
+
+    Q(s, a)  <-  Q(s, a) + alpha (r + gamma sum_a' pi(a' | s') Q(s', a') - Q(s, a))
+
+where pi is the epsilon-greedy policy that is followed. After a terminated step the target is `r`; a
+truncated episode would have gone on, so it bootstraps.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mjcartpole.learning.methods.action_values import (
+    ActionValueParameters,
+    QTable,
+    Rates,
+    act,
+    begin_episode,
+    best,
+    greedy_values,
+    learn_no_more,
+    make_memory,
+    move_towards,
+)
+from mjcartpole.learning.methods.experience import Transition
+from mjcartpole.learning.methods.parameters import numbers_class
+
+__all__ = ["act", "after_episode", "begin_episode", "greedy_values", "make_memory"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Parameters(ActionValueParameters):
+    """Those of action values."""
+
+
+Numbers = numbers_class(Parameters, __name__)
+after_episode = learn_no_more
+
+
+def after_step(
+    p: Any, memory: QTable, rates: Rates, step: Transition, rng: np.random.Generator
+) -> None:
+    """Learn from one step."""
+    if step.over and not p.learn_last_step:
+        return
+    q, target = memory.q_table, step.r
+    if not step.terminated:
+        mean = (q[2 * step.s_next] + q[2 * step.s_next + 1]) / 2
+        target += p.gamma * ((1 - rates.epsilon) * best(q, step.s_next) + rates.epsilon * mean)
+    move_towards(q, step.s, step.a, target, rates.alpha)

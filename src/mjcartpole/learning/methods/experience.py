@@ -1,0 +1,36 @@
+"""Experience: what a method learns from."""
+
+from typing import NamedTuple
+
+from mjcartpole.learning.discretizer import Floats, Ints
+
+
+class Transition(NamedTuple):
+    """One step."""
+
+    s: int
+    """Row of the state."""
+    a: int
+    """Action."""
+    r: float
+    """Reward."""
+    s_next: int
+    """Row of the state after it."""
+    terminated: bool
+    """Whether the rules ended the episode: nothing comes after it."""
+    over: bool
+    """Whether the episode ended at all, by the rules or by the time limit."""
+
+
+class Trajectory(NamedTuple):
+    """One episode. Its arrays may be longer than it was."""
+
+    states: Ints
+    """Rows, from the first state to the last: steps + 1 of them."""
+    actions: Ints
+    """What was done in each but the last."""
+    rewards: Floats
+    """What it gave."""
+    steps: int
+    terminated: bool
+    """Whether the rules ended it."""

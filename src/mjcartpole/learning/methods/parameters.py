@@ -1,0 +1,63 @@
+"""Parameters of a method: a dataclass for people, the same as plain numbers for its functions."""
+
+import collections
+import dataclasses
+from dataclasses import dataclass
+from typing import Any, Literal, get_args, get_origin
+
+from mjcartpole.errors import ConfigError
+from mjcartpole.learning.discretizer import is_finite
+
+
+@dataclass(frozen=True, kw_only=True)
+class Parameters:
+    """What a method can be told; the base of each method's own."""
+
+    def check_parameters(self) -> None:
+        """Refuse values that make no sense.
+
+        Raises:
+            ConfigError: See above.
+        """
+
+    def _check_shares(self, *names: str) -> None:
+        for name in names:
+            value = getattr(self, name)
+            if not (is_finite(value) and 0 <= value <= 1):
+                raise ConfigError(f"{name} must be a number from 0 to 1, not {value!r}")
+
+    def _check_one_of(self, name: str, available: tuple[str, ...]) -> None:
+        value = getattr(self, name)
+        if value not in available:
+            listed = " or ".join(map(repr, available))
+            raise ConfigError(f"{name} must be {listed}, not {value!r}")
+
+
+def numbers_class(parameters: type[Parameters], module: str) -> Any:
+    """Return the NamedTuple of a method's parameters, as its functions see them.
+
+    Args:
+        parameters: The dataclass.
+        module: The method's `__name__`: Numba keeps compiled code under `<module>.Numbers`.
+    """
+    names = [field.name for field in dataclasses.fields(parameters)]
+    return collections.namedtuple("Numbers", names, module=module)
+
+
+def numbers_of(parameters: Any, numbers: Any) -> Any:
+    """Return parameters as numbers: of a choice its place, and -1 for None.
+
+    Args:
+        parameters: A `Parameters`, or a dataclass that has its fields.
+        numbers: What `numbers_class` made.
+    """
+    kinds = {field.name: field.type for field in dataclasses.fields(parameters)}
+    return numbers(*(_number(getattr(parameters, name), kinds[name]) for name in numbers._fields))
+
+
+def _number(value: Any, kind: Any) -> float:
+    if get_origin(kind) is Literal:
+        return get_args(kind).index(value)
+    if value is None:
+        return -1.0
+    return value if kind in {bool, int} else float(value)

@@ -1,0 +1,75 @@
+"""SARSA: learns the values of the actions that it takes, explorations included.
+
+Rummery and Niranjan (1994); Sutton and Barto (2018), section 6.4:
+
+    Q(s, a)  <-  Q(s, a) + alpha (r + gamma Q(s', a') - Q(s, a))
+
+The next action a' is drawn before the update, and is then the one that is taken. After a terminated
+step the target is `r`; a truncated episode would have gone on, so it bootstraps.
+"""
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from mjcartpole.learning.methods.action_values import (
+    ActionValueParameters,
+    IntMemory,
+    Rates,
+    Table,
+    begin_episode,
+    choose,
+    draw_table,
+    greedy_values,
+    learn_no_more,
+    move_towards,
+)
+from mjcartpole.learning.methods.experience import Transition
+from mjcartpole.learning.methods.parameters import numbers_class
+
+__all__ = ["after_episode", "begin_episode", "greedy_values"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Parameters(ActionValueParameters):
+    """Those of action values."""
+
+
+Numbers = numbers_class(Parameters, __name__)
+after_episode = learn_no_more
+
+
+class Memory(NamedTuple):
+    """The table, and the action that was drawn for the next step."""
+
+    q_table: Table
+    next_action: IntMemory
+    """Shape (1,); -1 at the start of an episode."""
+
+
+def make_memory(p: Any, n_states: int, rng: np.random.Generator) -> Memory:
+    """Return a table to begin with, and no action."""
+    return Memory(draw_table(p, n_states, rng), np.array([-1], np.int64))
+
+
+def act(p: Any, memory: Memory, rates: Rates, s: int, rng: np.random.Generator) -> int:
+    """Return the action that was learned from, or at the start of an episode a new one."""
+    if memory.next_action[0] >= 0:
+        return memory.next_action[0]
+    return choose(memory.q_table, s, rates.epsilon, p.ties, rng)
+
+
+def after_step(
+    p: Any, memory: Memory, rates: Rates, step: Transition, rng: np.random.Generator
+) -> None:
+    """Draw the next action, and learn from the one before."""
+    q, target = memory.q_table, step.r
+    if not step.terminated:
+        a_next = choose(q, step.s_next, rates.epsilon, p.ties, rng)
+        target += p.gamma * q[2 * step.s_next + a_next]
+        memory.next_action[0] = a_next
+    if step.over:
+        memory.next_action[0] = -1
+    if p.learn_last_step or not step.over:
+        move_towards(q, step.s, step.a, target, rates.alpha)

@@ -1,0 +1,43 @@
+"""A method at work on a table that a test gives."""
+
+import numpy as np
+import pytest
+
+from mjcartpole.learning.config import TrainConfig
+from mjcartpole.learning.learner import Learner
+from mjcartpole.learning.methods.experience import Trajectory, Transition
+
+
+class AtWork(Learner):
+    """A learner whose functions are called with what they need."""
+
+    def __init__(self, table, **values):
+        config = TrainConfig(**{"alpha_final": 0.0, "epsilon_final": 0.0, "episodes": 20} | values)
+        super().__init__(config, len(table))
+        self.q = self.memory.q_table
+        self.q[:] = np.ravel(table)
+        self.begin(0)
+
+    @property
+    def table(self):
+        return self.q.reshape(-1, 2).tolist()
+
+    def begin(self, number):
+        self.rates = self.method.begin_episode(self.p, self.memory, number, self.episodes)
+
+    def act(self, s):
+        return self.method.act(self.p, self.memory, self.rates, s, self.rng)
+
+    def step(self, s, a, r, s_next, *, terminated=False, truncated=False):
+        step = Transition(s, a, r, s_next, terminated, terminated or truncated)
+        self.method.after_step(self.p, self.memory, self.rates, step, self.rng)
+
+    def replay(self, states, actions, rewards, *, terminated):
+        episode = Trajectory(states, actions, rewards, len(actions), terminated)
+        self.method.after_episode(self.p, self.memory, self.rates, episode, self.rng)
+
+
+@pytest.fixture
+def at_work():
+    """Return a learner on a table; keywords are fields of the config."""
+    return AtWork
