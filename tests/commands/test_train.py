@@ -335,6 +335,7 @@ def test_a_damaged_checkpoint_is_one_line_and_a_copy_of_it_goes_on(
     assert after == {name: text for name, text in before.items() if not name.startswith(".")}
     code, _, err = call(["train", "--resume", copy], capsys)
     assert (code, err) == (0, "")
+    copy.unlink()
     assert_equal_runs(killed, slow_reference)
 
 

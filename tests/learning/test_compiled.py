@@ -216,7 +216,7 @@ def numbers(low, high):
             'mass="1.0"': numbers(0.05, 3),
             'mass="0.1"': numbers(0.05, 3),
             'pos="0 0 0.5"': numbers(0.05, 3).map("0 0.01 {}".format),
-            'gear="10"': numbers(-30, 30),
+            'gear="10"': numbers(-30, -0.01) | numbers(0.01, 30),
             'gravity="0 0 -9.8"': numbers(-20, 1).map("0.1 0 {}".format),
             'damping="0"': st.just(0.0) | numbers(0, 2),
             'frictionloss="0"': st.just(0.0) | numbers(0, 0.5),
@@ -466,9 +466,12 @@ QUICK_TRAINING = """
     from mjcartpole.learning.config import TrainConfig
     from mjcartpole.learning.training import train
     from mjcartpole.learning import kernels
+    from mjcartpole.learning.methods import q_learning
+    from mjcartpole.task import one_per_step
     for seed in (0, 1):
         result = train(TrainConfig(backend="gym", episodes=4, seed=seed))
-    print(result.returns.tolist(), sum(kernels.learn_chunk.stats.cache_hits.values()))
+    stats = kernels.learn_chunk(q_learning, one_per_step).stats
+    print(result.returns.tolist(), sum(stats.cache_hits.values()))
 """
 COMPILING = "mjcartpole INFO compiling the training loop"
 

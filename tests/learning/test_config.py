@@ -1,5 +1,6 @@
 """Configs that make sense, and those that do not."""
 
+import copy
 import dataclasses
 import math
 
@@ -8,6 +9,7 @@ import pytest
 
 from mjcartpole.errors import ConfigError
 from mjcartpole.learning.config import PRESETS, TrainConfig
+from mjcartpole.learning.methods import METHODS
 
 
 def test_the_default_is_tuned():
@@ -40,7 +42,7 @@ def test_any_field_can_be_given():
 
 @pytest.mark.parametrize("name", list(PRESETS))
 def test_presets_name_fields_only(name):
-    assert set(PRESETS[name]) <= {field.name for field in dataclasses.fields(TrainConfig)}
+    assert set(PRESETS[name]) <= set(TrainConfig().fields())
 
 
 @pytest.mark.parametrize(
@@ -84,7 +86,7 @@ def test_values_that_make_no_sense(changes, message):
 def test_unknown_names_are_answered_with_those_that_are_there():
     with pytest.raises(ConfigError, match=r"'best' is unknown; available: tuned, article"):
         TrainConfig.preset("best")
-    with pytest.raises(ConfigError, match=r"no field gama; available: .*gamma"):
+    with pytest.raises(ConfigError, match=r"method 'q-learning' has no gama; available: .*gamma"):
         TrainConfig.preset("tuned", gama=0.9)
 
 
@@ -92,3 +94,29 @@ def test_lists_are_taken_as_tuples():
     config = TrainConfig(bins=[1, 3, 6, 8])
     assert config == TrainConfig()
     assert hash(config) == hash(TrainConfig())
+
+
+def test_a_method_has_parameters_of_its_own():
+    with pytest.raises(ConfigError, match=r"method 'sarsa' has no td_lambda; available: .*epsilon"):
+        TrainConfig(method="sarsa", td_lambda=0.5)
+    with pytest.raises(ConfigError, match="method 'best' is unknown; available: q-learning, sarsa"):
+        TrainConfig(method="best")
+    with pytest.raises(ConfigError, match="task 'Best-v0' is unknown"):
+        TrainConfig(task="Best-v0")
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_config_is_made_again_from_its_words_its_values_and_a_copy(method):
+    config = TrainConfig(method=method, alpha=0.25, bins=(1, 1, 3, 3))
+    assert config.method == method
+    assert eval(repr(config)) == config
+    assert TrainConfig(**config.values()) == copy.deepcopy(config) == config
+    assert dataclasses.replace(config, alpha=0.5).alpha == 0.5
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_another_method_takes_what_it_has_of_a_preset(preset):
+    config = TrainConfig.preset(preset, method="sarsa", seed=3)
+    ours = PRESETS[preset].items() - {("td_lambda", PRESETS[preset].get("td_lambda"))}
+    assert all(getattr(config, name) == value for name, value in ours)
+    assert (config.method, config.seed) == ("sarsa", 3)

@@ -38,7 +38,7 @@ def logged(episodes=EPISODES, capacity=6):
     ],
 )
 def test_why_an_episode_ended(terminated, x, ending):
-    assert ENDINGS[ending_index(terminated, x)] == ending
+    assert ENDINGS[ending_index(terminated, x, 2.4)] == ending
 
 
 def test_a_log_starts_empty():

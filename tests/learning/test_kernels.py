@@ -1,5 +1,6 @@
 """The pieces of the compiled loop, one by one, against what they stand for."""
 
+import functools
 import math
 import os
 import shutil
@@ -65,18 +66,31 @@ tables = st.lists(st.sampled_from([0.0, -0.0, 1.0]) | st.floats(-1e3, 1e3), min_
 rows = st.lists(st.integers(0, 3), min_size=1, max_size=30)
 
 
-@numba.njit
-def learn(act, after_step, after_episode, p, memory, rates, visited, terminated, rng):
-    steps = len(visited) - 1
-    actions, rewards = np.zeros(steps, np.int64), np.linspace(1.0, 2.0, steps)
-    for t in range(steps):
-        actions[t] = act(p, memory, rates, visited[t], rng)
-        over = t == steps - 1
-        step = Transition(
-            visited[t], actions[t], rewards[t], visited[t + 1], terminated and over, over
-        )
-        after_step(p, memory, rates, step, rng)
-    after_episode(p, memory, rates, Trajectory(visited, actions, rewards, steps, terminated), rng)
+def learning(act, after_step, after_episode):
+    """Return a loop without physics: it visits the rows that it is given."""
+
+    def learn(p, memory, rates, visited, terminated, rng):
+        steps = len(visited) - 1
+        actions, rewards = np.zeros(steps, np.int64), np.linspace(1.0, 2.0, steps)
+        for t in range(steps):
+            s, s_next, over = visited[t], visited[t + 1], t == steps - 1
+            actions[t] = act(p, memory, rates, s, rng)
+            step = Transition(s, actions[t], rewards[t], s_next, terminated and over, over)
+            after_step(p, memory, rates, step, rng)
+        episode = Trajectory(visited, actions, rewards, steps, terminated)
+        after_episode(p, memory, rates, episode, rng)
+
+    return learn
+
+
+@functools.cache
+def both(name):
+    """Return the loop of a method in Python, and compiled."""
+    names = ("act", "after_step", "after_episode")
+    method = METHODS[name]
+    kernels.learn_chunk(method, one_per_step)
+    loop = learning(*(getattr(method, each) for each in names))
+    return loop, numba.njit(error_model="numpy")(loop)
 
 
 @pytest.mark.parametrize("name", METHODS)
@@ -90,14 +104,12 @@ def test_every_method_learns_the_same_compiled(
         values["td_lambda"] = lam if lam != 0.1 else None
     values["ties"] = "random" if ties else "first"
     found = []
-    for function in (learn, learn.py_func):
+    for function in both(name):
         learner = Learner(TrainConfig(method=name, **values), 4)
         learner.memory.q_table[:] = table
-        functions = ("begin_episode", "act", "after_step", "after_episode")
-        _, *used = (kernels._compilable(getattr(learner.method, each)) for each in functions)
         rates = learner.method.begin_episode(learner.p, learner.memory, 3, 10)
         places = np.array(visited)
-        function(*used, learner.p, learner.memory, rates, places, terminated, learner.rng)
+        function(learner.p, learner.memory, rates, places, terminated, learner.rng)
         memory = [array.tobytes() for array in learner.memory]
         found.append((memory, learner.rng.bit_generator.state))
     assert found[0] == found[1]

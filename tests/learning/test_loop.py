@@ -78,26 +78,33 @@ def test_the_article_presets_do_what_the_articles_code_does(preset, engine):
 
 
 class Recorder:
-    """Stands in for a learner, pushes to the right, and keeps what it is taught."""
+    """Stands in for a learner and its method, pushes to the right, and keeps what it is taught."""
 
-    def __init__(self, learn_last_step, td_lambda=None):
-        self.learn_last_step = learn_last_step
-        self.td_lambda = td_lambda
-        self.taught = []
-        self.begun = []
+    p = rng = None
+    episodes = 9
 
-    def begin_episode(self, episode):
-        self.begun.append(episode)
-        self.taught.append([])
+    def __init__(self):
+        self.method = self
+        self.steps, self.whole, self.begun = [], [], []
 
-    def act(self, s):
+    def quick_memory(self):
+        return "memory"
+
+    def begin_episode(self, p, memory, number, episodes):
+        assert (memory, episodes) == ("memory", 9)
+        self.begun.append(number)
+        self.steps.append([])
+        return "rates"
+
+    def act(self, p, memory, rates, s, rng):
         return 1
 
-    def update(self, s, a, r, s_next, terminated):
-        self.taught[-1].append((s, a, r, s_next, terminated))
+    def after_step(self, p, memory, rates, step, rng):
+        assert rates == "rates"
+        self.steps[-1].append(tuple(step))
 
-    def replay(self, states, actions, rewards, over):
-        self.taught[-1].append((states, actions, rewards, over))
+    def after_episode(self, p, memory, rates, episode, rng):
+        self.whole.append(tuple(episode))
 
 
 class ThreeSteps(gymnasium.Env):
@@ -126,33 +133,23 @@ class ThreeSteps(gymnasium.Env):
 
 
 @pytest.mark.parametrize("terminates", [True, False])
-@pytest.mark.parametrize("learn_last_step", [True, False])
-def test_what_the_last_step_teaches(terminates, learn_last_step):
-    learner = Recorder(learn_last_step)
+def test_what_a_method_is_taught(terminates):
+    learner = Recorder()
     grid = Discretizer((4,), (0.0,), (4.0,))
-    env = ThreeSteps(terminates)
-    episodes = list(learn_episodes(env, learner, grid, range(5, 7)))
-    steps = [(0, 1, 1.0, 1, False), (1, 1, 1.0, 2, False)]
+    episodes = list(learn_episodes(ThreeSteps(terminates), learner, grid, range(5, 7)))
     # Truncated is not terminated: the learner may bootstrap.
-    last = [(2, 1, 1.0, 3, terminates)] if learn_last_step else []
-    assert learner.taught == [steps + last] * 2
+    steps = [
+        (0, 1, 1.0, 1, False, False),
+        (1, 1, 1.0, 2, False, False),
+        (2, 1, 1.0, 3, terminates, True),
+    ]
+    assert learner.steps == [steps] * 2
+    assert learner.whole == [([0, 1, 2, 3], [1, 1, 1], [1.0] * 3, 3, terminates)] * 2
     assert learner.begun == [5, 6], "the schedules see the numbers that were asked for"
     assert [(episode.number, episode.total, episode.steps) for episode in episodes] == [
         (5, 3.0, 3),
         (6, 3.0, 3),
     ]
-
-
-@pytest.mark.parametrize("terminates", [True, False])
-def test_what_is_replayed_after_an_episode(terminates):
-    grid = Discretizer((4,), (0.0,), (4.0,))
-    whole, cut = Recorder(True, td_lambda=0.9), Recorder(False, td_lambda=0.9)
-    for learner in (whole, cut):
-        episodes = list(learn_episodes(ThreeSteps(terminates), learner, grid, range(1)))
-        assert (episodes[0].total, episodes[0].steps) == (3.0, 3)
-    assert whole.taught == [[([0, 1, 2, 3], [1, 1, 1], [1.0] * 3, terminates)]]
-    # Without its last step an episode has an open end.
-    assert cut.taught == [[([0, 1, 2], [1, 1], [1.0] * 2, False)]]
 
 
 class Diverging(ThreeSteps):
@@ -170,9 +167,8 @@ class Diverging(ThreeSteps):
         return super().step(action)
 
 
-@pytest.mark.parametrize("td_lambda", [None, 0.5])
-def test_diverging_physics_are_named_by_episode_and_step(td_lambda):
-    learner, grid = Recorder(True, td_lambda), Discretizer((4,), (0.0,), (4.0,))
+def test_diverging_physics_are_named_by_episode_and_step():
+    learner, grid = Recorder(), Discretizer((4,), (0.0,), (4.0,))
     episodes = learn_episodes(Diverging(True), learner, grid, range(1_300, 1_400))
     assert next(episodes).number == 1_300
     with pytest.raises(SimulationError, match=r"^episode 1,302, step 2: the simulation diverged$"):
