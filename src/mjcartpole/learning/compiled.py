@@ -19,9 +19,10 @@ from mjcartpole.learning.loop import in_episode
 from mjcartpole.learning.policy import Policy
 from mjcartpole.learning.qlearning import TabularQ
 from mjcartpole.learning.stepping import GymPhysics, MujocoPhysics, Physics, PolesPhysics, link
+from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.cartpole_v1 import FORCE
 from mjcartpole.physics.library import libmujoco
-from mjcartpole.physics.load import CartPole, ModelLike, load_model
+from mjcartpole.physics.load import ModelLike, load_model
 from mjcartpole.physics.simulation import Simulation, check_sane
 
 CHUNK_STEPS: Final = 50_000

@@ -15,7 +15,7 @@ from mjcartpole.learning.discretizer import Discretizer, is_finite
 from mjcartpole.learning.qlearning import Ties
 
 if TYPE_CHECKING:
-    from mjcartpole.physics.load import CartPole
+    from mjcartpole.physics.cartpole import CartPole
 
 MAX_SEED: Final = 2**128 - 1
 """A generator's state has as many bits."""

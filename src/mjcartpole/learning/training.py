@@ -19,7 +19,7 @@ from mjcartpole.learning.loop import learn_episodes
 from mjcartpole.learning.policy import Policy
 from mjcartpole.learning.qlearning import TabularQ
 from mjcartpole.learning.schedules import LinearSchedule
-from mjcartpole.physics.load import CartPole
+from mjcartpole.physics.cartpole import CartPole
 
 LEARNER_STREAM: Final = 1
 """Spawn key of the learner's generator: its draws are independent of the env's."""

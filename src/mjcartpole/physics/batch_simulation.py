@@ -13,7 +13,7 @@ from mujoco import batch as mujoco_batch
 
 from mjcartpole.errors import ConfigError, SimulationError
 from mjcartpole.integrator import Integrator, check_integrator
-from mjcartpole.physics.load import CartPole
+from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.simulation import LARGEST_SANE, check_sane, stepping_model
 
 _SHARE: Final = 4

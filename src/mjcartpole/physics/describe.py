@@ -9,8 +9,8 @@ import numpy as np
 
 from mjcartpole import task
 from mjcartpole.physics.bodies import cart_bodies, mass_of, pole_bodies
+from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.file_steps import method_of
-from mjcartpole.physics.load import CartPole
 from mjcartpole.physics.structure import LEAST_ARM, Directions, Vector, directions, is_servo, push
 from mjcartpole.physics.unmodelled_effects import beyond_equations, beyond_step
 

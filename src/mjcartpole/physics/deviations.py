@@ -9,8 +9,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
+from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.equations import Parameters
-from mjcartpole.physics.load import CartPole
 from mjcartpole.physics.parameters import (
     differences,
     geometry_of,

@@ -13,9 +13,9 @@ import numpy as np
 import numpy.typing as npt
 
 from mjcartpole.physics.bodies import farthest_from_origin
+from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.equations import Parameters, coefficients
 from mjcartpole.physics.free_region import WIDE_BOX, FreeRegion
-from mjcartpole.physics.load import CartPole
 from mjcartpole.physics.parameters import joint_label, label
 from mjcartpole.physics.structure import push
 

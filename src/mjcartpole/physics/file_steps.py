@@ -13,8 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from mjcartpole.physics import equations
+from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.equations import Array, Parameters, coefficients
-from mjcartpole.physics.load import CartPole
 from mjcartpole.physics.parameters import is_on
 
 METHODS = ("Euler", "Euler without eulerdamp", "implicitfast", "implicit", "RK4")

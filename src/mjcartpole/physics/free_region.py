@@ -13,8 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from mjcartpole import task
+from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.equations import Parameters, derivative
-from mjcartpole.physics.load import CartPole
 from mjcartpole.physics.parameters import is_on, joint_label, label
 from mjcartpole.physics.simulation import nothing_can_touch
 

@@ -17,9 +17,9 @@ import numpy.typing as npt
 from mjcartpole import task
 from mjcartpole.errors import ModelError, NotACartPoleError
 from mjcartpole.physics.bodies import cart_bodies, mass_of, pole_bodies
+from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.dry_friction import DryFriction
 from mjcartpole.physics.equations import Parameters
-from mjcartpole.physics.load import CartPole
 from mjcartpole.physics.structure import directions, push
 
 TILT: Final = 1e-14

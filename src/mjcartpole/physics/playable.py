@@ -14,7 +14,7 @@ import numpy as np
 from mjcartpole import task
 from mjcartpole.errors import SimulationError
 from mjcartpole.integrator import Integrator
-from mjcartpole.physics.load import CartPole
+from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.simulation import Simulation, State
 
 STARTS: Final = 8

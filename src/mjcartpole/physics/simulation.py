@@ -10,7 +10,7 @@ import numpy.typing as npt
 from mjcartpole import task
 from mjcartpole.errors import ConfigError, SimulationError
 from mjcartpole.integrator import Integrator, check_integrator
-from mjcartpole.physics.load import CartPole
+from mjcartpole.physics.cartpole import CartPole
 
 State = tuple[float, ...]
 """`(x, x_dot, theta, theta_dot)`: m, m/s, rad, rad/s; two more values for each further pole."""

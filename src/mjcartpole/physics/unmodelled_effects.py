@@ -11,12 +11,12 @@ import numpy as np
 
 from mjcartpole.errors import ModelError
 from mjcartpole.physics.bodies import moving_bodies
+from mjcartpole.physics.cartpole import CartPole, with_options
 from mjcartpole.physics.deviations import deviations
 from mjcartpole.physics.engine_check import unexplained_forces
 from mjcartpole.physics.equations import CARTPOLE_V1, Parameters
 from mjcartpole.physics.file_steps import file_step, method_of
 from mjcartpole.physics.free_region import WIDE_BOX, free_region
-from mjcartpole.physics.load import CartPole, with_options
 from mjcartpole.physics.parameters import (
     can_push,
     is_on,

@@ -15,9 +15,9 @@ import numpy.typing as npt
 
 from mjcartpole.errors import ConfigError
 from mjcartpole.physics.bodies import cart_bodies, mass_of, pole_bodies
+from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.edit.document import Document, Element
 from mjcartpole.physics.edit.xml_elements import Parts, numbers_of
-from mjcartpole.physics.load import CartPole
 from mjcartpole.physics.parameters import pole_of
 
 Vector = npt.NDArray[np.float64]

@@ -13,11 +13,12 @@ import numpy.typing as npt
 from mjcartpole import task
 from mjcartpole.errors import ConfigError
 from mjcartpole.physics.bodies import cart_bodies, mass_of
+from mjcartpole.physics.build import build
+from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.edit.document import Document
 from mjcartpole.physics.edit.element_path import find_element
 from mjcartpole.physics.edit.rescale import set_cart_mass, set_length, set_pole_mass
 from mjcartpole.physics.edit.xml_elements import Parts, number_text
-from mjcartpole.physics.load import CartPole, load_named
 from mjcartpole.physics.parameters import forces_of, pole_of
 
 
@@ -112,7 +113,7 @@ def apply_meanings(document: Document, values: Mapping[str, float], name: str) -
         ConfigError: The document leaves no room for an edit; the reason is said.
         ModelError: The document is no cart-pole, or is none afterwards.
     """
-    cartpole = load_named(document.text, name)
+    cartpole = build(document.text, name, own_timestep=True)
     whole, by_pole = _sort_by_pole(values, cartpole.poles)
     _edit_options(document, cartpole.model, whole)
     parts = Parts(document)
@@ -123,7 +124,7 @@ def apply_meanings(document: Document, values: Mapping[str, float], name: str) -
         set_cart_mass(parts, cartpole, whole["cart.mass"])
     centres = [_edit_pole(document, cartpole, pole, wanted) for pole, wanted in enumerate(by_pole)]
     name += f" with {', '.join(f'{key}={value:g}' for key, value in values.items())}"
-    after = load_named(document.text, name)
+    after = build(document.text, name, own_timestep=True)
     _check_outcome(_found(after), whole)
     for pole, wanted in enumerate(by_pole):
         _check_outcome(_found_of_pole(after, pole), wanted)
@@ -168,7 +169,9 @@ def _edit_pole(
         longer = set_length(Parts(document), before, values["pole.length"], pole)
     if "pole.length" in values or "pole.mass" in values:
         mass = values.get("pole.mass", wanted.mass)
-        set_pole_mass(Parts(document), load_named(document.text, before.name), mass, pole)
+        set_pole_mass(
+            Parts(document), build(document.text, before.name, own_timestep=True), mass, pole
+        )
     return longer * wanted.com
 
 
