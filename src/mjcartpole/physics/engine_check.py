@@ -15,7 +15,7 @@ import numpy.typing as npt
 from mjcartpole.physics.bodies import farthest_from_origin
 from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.equations import Parameters, coefficients
-from mjcartpole.physics.free_region import WIDE_BOX, FreeRegion
+from mjcartpole.physics.free_region import FreeRegion, wide_box
 from mjcartpole.physics.parameters import joint_label, label
 from mjcartpole.physics.structure import push
 
@@ -48,7 +48,7 @@ def unexplained_forces(cartpole: CartPole, p: Parameters, region: FreeRegion) ->
         A phrase for each kind: the name of MuJoCo's array, and where and how much.
     """
     rng = np.random.default_rng(0)
-    low, high = region.box(WIDE_BOX)
+    low, high = region.box(wide_box(region.task))
     offset = farthest_from_origin(cartpole)
     found: dict[str, tuple[float, str]] = {}
     data = mujoco.MjData(cartpole.model)
