@@ -44,14 +44,14 @@ class PoleDescription:
     leans: int
 
     def what(self) -> str:
-        """What it is, in words."""
+        """Return what it is, in words."""
         arm = f"centre of mass {self.com_distance:.6g} m from the hinge"
         if self.com_distance < LEAST_ARM:
             arm = "centre of mass on the hinge, so that it cannot fall"
         return f"{self.joint}, {self.mass:.6g} kg, {arm}"
 
     def angle(self) -> str:
-        """From where its angle is counted, in words."""
+        """Return from where its angle is counted, in words."""
         side = "+x" if self.leans > 0 else "-x"
         words = f"0 is upright, a positive angle leans to {side} of the rail"
         if self.upright:
@@ -120,7 +120,7 @@ class Description:
         return not self.beyond
 
     def text(self) -> list[str]:
-        """The description in lines, each with a label."""
+        """Return the description in lines, each with a label."""
         lines = [
             ("cart", f"{self.cart}, {self.cart_mass:.6g} kg"),
             *((f"pole{number}", pole.what()) for number, pole in self._numbered()),
@@ -135,7 +135,7 @@ class Description:
         return [f"{label:<{_LABEL_WIDTH}}{words}" for label, words in lines]
 
     def _numbered(self) -> list[tuple[str, PoleDescription]]:
-        """Each pole with what tells it from the others; nothing where there is one."""
+        """Return each pole with what tells it from the others; nothing where there is one."""
         if len(self.poles) == 1:
             return [("", self.poles[0])]
         return [(f" {number}", pole) for number, pole in enumerate(self.poles, start=1)]
@@ -216,7 +216,7 @@ def _pole(cartpole: CartPole, pole: int, found: Directions) -> PoleDescription:
 
 
 def axis_name(axis: Vector) -> str:
-    """A direction by the world axis that it follows, `"+x"`, or by its numbers."""
+    """Return a direction by the world axis that it follows, `"+x"`, or by its numbers."""
     index = int(np.abs(axis).argmax())
     if abs(axis[index]) > 1 - _NOTHING:
         return f"{'+' if axis[index] > 0 else '-'}{'xyz'[index]}"

@@ -109,7 +109,7 @@ class _Search:
         self._cost = simulation.cartpole.substeps * (4 if rk4 else 1)
 
     def lost(self, starts: list[State]) -> list[tuple[str, int]]:
-        """How, and within how many control steps, each start is lost that no policy survives.
+        """Return how, and within how many steps, each start is lost that no policy survives.
 
         It stops where too few can be lost.
         """
@@ -121,7 +121,7 @@ class _Search:
         return found
 
     def thrown(self, start: State) -> tuple[str, int] | None:
-        """Whether all sequences of actions end, and after how many control steps the last one."""
+        """Say whether all sequences of actions end, and after how many steps the last one."""
         longest, trials, open_states = 0, 0, [(start, 0)]
         while open_states:
             state, done = open_states.pop()
@@ -135,7 +135,7 @@ class _Search:
         return "thrown", longest
 
     def overcome(self, start: State) -> tuple[str, int] | None:
-        """Whether both steady pushes end on the same side, and after how many control steps.
+        """Say whether both steady pushes end on the same side, and after how many steps.
 
         The comparison holds for one pole, and where nothing depends on the cart's place.
         """
@@ -153,7 +153,7 @@ class _Search:
         return ("carried", carried) if carried else None
 
     def held(self, control: float) -> int:
-        """Control steps until one action, held, ends an episode; `COARSE` + 1 if more."""
+        """Return control steps until one action, held, ends an episode; `COARSE` + 1 if more."""
         self.simulation.set_state((0.0,) * self.simulation.size)
         return next(
             (n for n in range(1, COARSE + 1) if self._has_ended(self.simulation.step(control))),
@@ -161,20 +161,20 @@ class _Search:
         )
 
     def _one_way(self, start: State) -> bool:
-        """Whether the cart sets off to the same side by either action."""
+        """Return whether the cart sets off to the same side by either action."""
         both = np.array(self._controls)
         left, right = self.simulation.accelerations(np.array([start, start]), both)[:, 0]
         return bool(left * right > 0)
 
     def _same_side(self, start: State, place: int, limit: float) -> int:
-        """Control steps until either steady push has driven a value out on one side; 0 if not."""
+        """Return the steps until either steady push has driven a value out on one side; else 0."""
         left, right = self._controls
         side, steps = self._pushed(start, left, place, limit)
         other, more = self._pushed(start, right, place, limit) if side else (0, 0)
         return max(steps, more) if side and side == other else 0
 
     def _pushed(self, start: State, control: float, place: int, limit: float) -> tuple[int, int]:
-        """To which side a value of the state leaves its limits under a steady push, and when.
+        """Find to which side a steady push drives a value of the state out, and when.
 
         Returns:
             -1 or 1, or 0 where it stays or the cart's place plays a part; and control steps.
@@ -206,5 +206,5 @@ class _Search:
 
 
 def _danger(state: State) -> float:
-    """How far the pole that leans most will lean in a moment."""
+    """Return how far the pole that leans most will lean in a moment."""
     return max_abs([a + 0.25 * b for a, b in zip(state[2::2], state[3::2], strict=True)])

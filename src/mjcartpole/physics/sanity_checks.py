@@ -113,7 +113,7 @@ def check_motion(name: str, parts: HasParts) -> None:
 
 @functools.cache
 def _float_fields(part: str) -> tuple[str, ...]:
-    """Names of all numbers in a part of a model, whatever MuJoCo's version has there."""
+    """Return the names of all numbers in a part of a model, whatever this MuJoCo has there."""
     owner = _part(mujoco.MjModel.from_xml_string("<mujoco/>"), part)
     names = [name for name in dir(owner) if not name.startswith("_")]
     return tuple(name for name in names if _holds_floats(getattr(owner, name)))

@@ -125,7 +125,7 @@ def _steps_as(cartpole: CartPole, method: str, region: FreeRegion) -> bool:
 
 
 def overridden_masses(cartpole: CartPole) -> list[str]:
-    """Masses that the document gives to geoms and that an explicit `<inertial>` overrides.
+    """Return masses that the document gives to geoms and that an explicit `<inertial>` overrides.
 
     They change nothing in the motion, whatever the person who wrote them expected.
 
@@ -199,7 +199,7 @@ def _turning_slider(cartpole: CartPole) -> Iterator[str]:
 
 
 def _inexact_solver(model: mujoco.MjModel) -> str:
-    """Why MuJoCo's solver does not find dry friction as the equations have it; empty if it does."""
+    """Say why MuJoCo's solver does not find the equations' dry friction; empty if it does."""
     solver = mujoco.mjtSolver(int(model.opt.solver))
     if solver != mujoco.mjtSolver.mjSOL_NEWTON:
         return f"the solver {solver.name.removeprefix('mjSOL_')}"
@@ -212,7 +212,7 @@ def _inexact_solver(model: mujoco.MjModel) -> str:
 
 
 def _joints(cartpole: CartPole) -> Iterator[Effect]:
-    """Springs, damping that is not viscous, and dry friction that is not solved exactly."""
+    """Yield springs, damping that is not viscous, and dry friction that is not solved exactly."""
     model, bit = cartpole.model, mujoco.mjtDisableBit
     solver = _inexact_solver(model)
     constrained = is_on(model, bit.mjDSBL_CONSTRAINT) and is_on(model, bit.mjDSBL_FRICTIONLOSS)
@@ -228,7 +228,7 @@ def _joints(cartpole: CartPole) -> Iterator[Effect]:
 
 
 def _actuator(cartpole: CartPole) -> Iterator[Effect]:
-    """Whatever makes the motor more than a force, or a brake in proportion to the velocity."""
+    """Yield what makes the motor more than a force, or a brake proportional to the velocity."""
     model, motor = cartpole.model, cartpole.motor
     if not can_push(cartpole):
         return
@@ -248,7 +248,7 @@ def _actuator(cartpole: CartPole) -> Iterator[Effect]:
 
 
 def _ties(cartpole: CartPole) -> Iterator[Effect]:
-    """Equality constraints, tendons, deformable things and plugins."""
+    """Yield equality constraints, tendons, deformable things and plugins."""
     model, bit = cartpole.model, mujoco.mjtDisableBit
     if is_on(model, bit.mjDSBL_EQUALITY) and is_on(model, bit.mjDSBL_CONSTRAINT):
         for index in np.flatnonzero(model.eq_active0).tolist():
@@ -266,7 +266,7 @@ def _ties(cartpole: CartPole) -> Iterator[Effect]:
 
 
 def _surroundings(cartpole: CartPole) -> Iterator[Effect]:
-    """Bodies without weight, air or water, and sleep."""
+    """Yield bodies without weight, air or water, and sleep."""
     model = cartpole.model
     weighs = model.opt.gravity.any() and is_on(model, mujoco.mjtDisableBit.mjDSBL_GRAVITY)
     for body in moving_bodies(cartpole):

@@ -64,7 +64,7 @@ def set_pole_mass(parts: Parts, cartpole: CartPole, mass: float, pole: int = 0) 
 
 
 def _ratio(new: float, old: float) -> float:
-    """New by old; 1 where only rounding is between them, so that an edit made twice is one."""
+    """Return new by old; 1 where only rounding is between them: an edit made twice is one."""
     return 1.0 if math.isclose(new, old, rel_tol=1e-14) else new / max(old, mujoco.mjMINVAL)
 
 
@@ -119,7 +119,7 @@ class _RodInertial:
 
     @classmethod
     def of(cls, parts: Parts, cartpole: CartPole, pole: int) -> "_RodInertial | None":
-        """A pole's own; None if it has none, or is no such rod."""
+        """Return a pole's own; None if it has none, or is no such rod."""
         model, hinge = cartpole.model, cartpole.hinges[pole]
         root = int(model.jnt_bodyid[hinge])
         element = parts.inertial(model, root)
@@ -152,7 +152,7 @@ class _RodInertial:
 
 
 def uniform_rod_inertia(mass: float, length: float) -> float:
-    """M L^2 / 12, kg m^2, of the numbers as they are written: 0.2 * 1.5^2 / 12 gives 0.0375.
+    """Return M L^2 / 12, kg m^2, of the numbers as they are written.
 
     Plain floats would leave noise in the last digits, in a file that people read.
     """
@@ -192,7 +192,7 @@ def set_length(parts: Parts, cartpole: CartPole, length: float, pole: int = 0) -
 
 
 def length_of(cartpole: CartPole, pole: int = 0) -> float:
-    """A pole's length, hinge to tip, m, as `set_length` has it.
+    """Return a pole's length, hinge to tip, m, as `set_length` has it.
 
     Raises:
         ConfigError: The document does not show it; the reason is said.
@@ -203,7 +203,7 @@ def length_of(cartpole: CartPole, pole: int = 0) -> float:
 def _measured(
     parts: Parts, cartpole: CartPole, pole: int
 ) -> "tuple[_RodInertial | None, _Stretch]":
-    """A pole's rod, if it is one, and a stretch that knows how long the pole is."""
+    """Return a pole's rod, if it is one, and a stretch that knows how long the pole is."""
     model, hinge = cartpole.model, cartpole.hinges[pole]
     root, com = int(model.jnt_bodyid[hinge]), pole_of(cartpole, pole).com
     rod, stretch = _RodInertial.of(parts, cartpole, pole), _Stretch(parts, model, hinge, com, root)
@@ -234,14 +234,14 @@ class _Stretch:
         self.old = self.new = 1.0
 
     def value(self, old: float) -> float:
-        """A distance along the pole; its tip and its middle come out without rounding."""
+        """Return a distance along the pole; its tip and its middle come out without rounding."""
         for share in (1.0, 0.5):
             if math.isclose(abs(old), share * self.old, rel_tol=1e-12):
                 return math.copysign(share * self.new, old)
         return old * _ratio(self.new, self.old)
 
     def point(self, point: Sequence[float]) -> list[float]:
-        """A point in the frame of the pole's body."""
+        """Return a point in the frame of the pole's body."""
         arm = np.array(point) - self.foot
         if self.axis is not None:
             moved = list(point)
@@ -255,7 +255,7 @@ class _Stretch:
         ]
 
     def reach(self) -> float:
-        """How far the pole reaches from the hinge: the axes of its geoms, without round ends."""
+        """Return how far the pole reaches from the hinge: its geoms' axes, without round ends."""
         reached = [0.0]
         for index, element in self.parts.geoms(self.model, self.root):
             ends = self._ends(index, element)
@@ -265,7 +265,7 @@ class _Stretch:
         return max(reached)
 
     def inertial(self, element: Element) -> None:
-        """Any mass distribution along the pole: inertia goes with the length squared."""
+        """Return any mass distribution along the pole: inertia goes with the length squared."""
         if self.axis is None or _TURNED & set(element.attributes):
             raise ConfigError(
                 "pole.length cannot be set: the pole's <inertial> is turned or beside its axis; "
@@ -329,5 +329,5 @@ class _Stretch:
         return None if math.isnan(values[0]) else values
 
     def _spec(self, index: int) -> mujoco.MjsGeom:
-        """A geom as the document has it, defaults included."""
+        """Return a geom as the document has it, defaults included."""
         return self._effective[index]

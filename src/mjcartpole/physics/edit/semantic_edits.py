@@ -37,7 +37,7 @@ class Meaning:
     zero: bool = True
 
     def check(self, key: str, value: object) -> float:
-        """The value as a number.
+        """Return the value as a number.
 
         Raises:
             ConfigError: It is no number, not finite, or outside physics.
@@ -84,7 +84,7 @@ _JOINT_ATTRIBUTES: Final = {
 
 
 def meaning_of(key: str) -> Meaning | None:
-    """What an edit by meaning stands for; None where a key is none.
+    """Return what an edit by meaning stands for; None where a key is none.
 
     Where there are several poles, a number says which: pole2.length, hinge1.damping.
     """
@@ -92,7 +92,7 @@ def meaning_of(key: str) -> Meaning | None:
 
 
 def names_like(key: str) -> list[str]:
-    """What can be named, with the pole's number where a key has one."""
+    """Return what can be named, with the pole's number where a key has one."""
     numbered = _NUMBERED.match(key)
     return [_with_number(name, numbered[2]) if numbered else name for name in MEANINGS]
 
@@ -134,7 +134,7 @@ def apply_meanings(document: Document, values: Mapping[str, float], name: str) -
 def _sort_by_pole(
     values: Mapping[str, float], poles: int
 ) -> tuple[dict[str, float], list[dict[str, float]]]:
-    """Edits of the whole, and those of each pole without its number.
+    """Return edits of the whole, and those of each pole without its number.
 
     Raises:
         ConfigError: It is not clear which pole, or there is no such pole.
@@ -208,7 +208,7 @@ def _joint_value(cartpole: CartPole, joint: int, name: str) -> float:
 
 
 def _edit_force(parts: Parts, cartpole: CartPole, force: float) -> None:
-    """Through the gear, which is what force there is per unit of control."""
+    """Set the force through the gear, which is what force there is per unit of control."""
     model, motor = cartpole.model, cartpole.motor
     left, right = forces_of(cartpole)
     fixed = model.actuator_gaintype[motor] == mujoco.mjtGain.mjGAIN_FIXED
@@ -229,7 +229,7 @@ def _edit_force(parts: Parts, cartpole: CartPole, force: float) -> None:
 
 
 def _check_centre(cartpole: CartPole, pole: int, wanted: npt.NDArray[np.float64]) -> None:
-    """All that turns on the hinge must have become longer in the same proportion."""
+    """Refuse a pole of which not all has become longer in the same proportion."""
     found = pole_of(cartpole, pole).com
     if np.abs(found - wanted).max() > 1e-9 * np.abs(wanted).max():
         raise ConfigError(
@@ -240,7 +240,7 @@ def _check_centre(cartpole: CartPole, pole: int, wanted: npt.NDArray[np.float64]
 
 
 def _found(cartpole: CartPole) -> dict[str, float]:
-    """What a model has, by the names of the edits of the whole."""
+    """Return what a model has, by the names of the edits of the whole."""
     model = cartpole.model
     return {
         "cart.mass": mass_of(model, cart_bodies(cartpole)),
@@ -264,7 +264,7 @@ def _found_of_joint(cartpole: CartPole, joint: int, part: str) -> dict[str, floa
 
 
 def _check_outcome(found: Mapping[str, float], values: Mapping[str, float]) -> None:
-    """What was asked must be what the model has, whatever else the document says."""
+    """Refuse a model that has not what was asked, whatever else the document says."""
     for key, value in values.items():
         if key in found and not math.isclose(found[key], value, rel_tol=1e-9):
             raise ConfigError(
