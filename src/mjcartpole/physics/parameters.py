@@ -283,12 +283,12 @@ def pole_of(cartpole: CartPole, pole: int = 0) -> _Pole:
         if body != root:
             position, turn = frames[int(model.body_parentid[body])]
             place = position + turn @ model.body_pos[body]
-            frames[body] = place, turn @ _rotation(model.body_quat[body])
+            frames[body] = place, turn @ rotation(model.body_quat[body])
         position, turn = frames[body]
         # The engine takes a centre of mass nearer than 1e-6 m for in place.
         in_place = model.body_sameframe[body] == mujoco.mjtSameFrame.mjSAMEFRAME_BODY
         places.append(position if in_place else position + turn @ model.body_ipos[body])
-        along = axis @ turn @ _rotation(model.body_iquat[body])
+        along = axis @ turn @ rotation(model.body_iquat[body])
         moments.append(float(along * along @ model.body_inertia[body]))
     com = places[0].copy()
     for body, place in zip(bodies, places, strict=True):
@@ -300,7 +300,8 @@ def pole_of(cartpole: CartPole, pole: int = 0) -> _Pole:
     return _Pole(mass, com - model.jnt_pos[hinge], inertia)
 
 
-def _rotation(quaternion: Vector) -> Vector:
+def rotation(quaternion: Vector) -> Vector:
+    """Return the rotation matrix of a quaternion, shape (3, 3)."""
     matrix = np.empty(9)
     mujoco.mju_quat2Mat(matrix, quaternion)
     return matrix.reshape(3, 3)

@@ -7,6 +7,7 @@ and MuJoCo computes again.
 import math
 from collections.abc import Sequence
 from fractions import Fraction
+from functools import cached_property
 from typing import Final
 
 import mujoco
@@ -18,7 +19,7 @@ from mjcartpole.physics.bodies import cart_bodies, mass_of, pole_bodies
 from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.edit.document import Document, Element
 from mjcartpole.physics.edit.xml_elements import Parts, numbers_of
-from mjcartpole.physics.parameters import pole_of
+from mjcartpole.physics.parameters import pole_of, rotation
 
 Vector = npt.NDArray[np.float64]
 
@@ -89,10 +90,7 @@ def _set_mass(
 def _scale_geoms(parts: Parts, model: mujoco.MjModel, body: int, ratio: float) -> None:
     if ratio == 1:
         return
-    spec = parts.spec()
-    effective = [geom for each in spec.bodies for geom in each.geoms]
-    for index, element in parts.geoms(model, body):
-        geom = effective[index]
+    for _, element, geom in parts.geoms(model, body):
         if math.isnan(geom.mass):
             parts.put(element, "density", [ratio * float(geom.density)])
         elif geom.mass > 0:
@@ -229,8 +227,6 @@ class _Stretch:
         axis = int(np.abs(along).argmax())
         self.axis = axis if abs(along[axis]) > 1 - 1e-15 else None
         self.along = np.eye(3)[axis] * np.sign(along[axis]) if self.axis is not None else along
-        spec = parts.spec()
-        self._effective = [geom for body in spec.bodies for geom in body.geoms]
         self.old = self.new = 1.0
 
     def value(self, old: float) -> float:
@@ -257,9 +253,8 @@ class _Stretch:
     def reach(self) -> float:
         """Return how far the pole reaches from the hinge: its geoms' axes, without round ends."""
         reached = [0.0]
-        for index, element in self.parts.geoms(self.model, self.root):
-            ends = self._ends(index, element)
-            reached.extend(float((np.array(end) - self.foot) @ self.along) for end in ends)
+        for index, _, geom in self._geoms:
+            reached += [float((end - self.foot) @ self.along) for end in self._ends(index, geom)]
         if max(reached) <= 0:
             raise ConfigError("pole.length cannot be set: no geom of the pole shows its length")
         return max(reached)
@@ -279,25 +274,26 @@ class _Stretch:
 
     def geoms(self) -> None:
         """Stretch what lies along the pole, move the rest."""
-        for index, element in self.parts.geoms(self.model, self.root):
-            fromto = self._fromto(index)
+        for index, element, geom in self._geoms:
+            fromto = _fromto(geom)
             if fromto is not None:
                 ends = [*self.point(fromto[:3]), *self.point(fromto[3:])]
                 if ends != fromto:
                     self.parts.put(element, "fromto", ends)
                 continue
-            self._resize(index, element)
-            pos = [float(value) for value in self._spec(index).pos]
+            self._resize(index, element, geom)
+            pos = [float(value) for value in geom.pos]
             moved = self.point(pos)
             if moved != pos:
                 self.parts.put(element, "pos", moved)
 
-    def _resize(self, index: int, element: Element) -> None:
-        model, size = self.model, [float(value) for value in self._spec(index).size]
-        kind = int(model.geom_type[index])
-        turn = np.empty(9)
-        mujoco.mju_quat2Mat(turn, model.geom_quat[index])
-        parallel = np.abs(turn.reshape(3, 3).T @ self.along)
+    @cached_property
+    def _geoms(self) -> list[tuple[int, Element, mujoco.MjsGeom]]:
+        return self.parts.geoms(self.model, self.root)
+
+    def _resize(self, index: int, element: Element, geom: mujoco.MjsGeom) -> None:
+        kind, size = int(self.model.geom_type[index]), [float(value) for value in geom.size]
+        parallel = self._shares(index)
         side = int(parallel.argmax())
         if kind == mujoco.mjtGeom.mjGEOM_SPHERE:
             return
@@ -311,23 +307,23 @@ class _Stretch:
         else:
             raise ConfigError("pole.length cannot be set: a mesh of the pole cannot be stretched")
 
-    def _ends(self, index: int, element: Element) -> list[list[float]]:
-        fromto = self._fromto(index)
+    def _ends(self, index: int, geom: mujoco.MjsGeom) -> tuple[Vector, Vector]:
+        fromto = _fromto(geom)
         if fromto is not None:
-            return [fromto[:3], fromto[3:]]
-        model, kind = self.model, int(self.model.geom_type[index])
-        turn = np.empty(9)
-        mujoco.mju_quat2Mat(turn, model.geom_quat[index])
-        half = [0.0, 0.0, float(model.geom_size[index, 1])]
-        if kind not in _LONG:
-            half = [float(value) for value in model.geom_size[index]]
-        arm = np.abs(turn.reshape(3, 3).T @ self.along) @ np.array(half) * self.along
-        return [list(model.geom_pos[index] - arm), list(model.geom_pos[index] + arm)]
+            return np.array(fromto[:3]), np.array(fromto[3:])
+        model = self.model
+        half = model.geom_size[index]
+        if int(model.geom_type[index]) in _LONG:
+            half = np.array([0.0, 0.0, half[1]])
+        arm = self._shares(index) @ half * self.along
+        return model.geom_pos[index] - arm, model.geom_pos[index] + arm
 
-    def _fromto(self, index: int) -> list[float] | None:
-        values = [float(value) for value in self._spec(index).fromto]
-        return None if math.isnan(values[0]) else values
+    def _shares(self, index: int) -> Vector:
+        """Return how much each axis of a geom goes along the pole, shape (3,)."""
+        shares: Vector = np.abs(rotation(self.model.geom_quat[index]).T @ self.along)
+        return shares
 
-    def _spec(self, index: int) -> mujoco.MjsGeom:
-        """Return a geom as the document has it, defaults included."""
-        return self._effective[index]
+
+def _fromto(geom: mujoco.MjsGeom) -> list[float] | None:
+    values = [float(value) for value in geom.fromto]
+    return None if math.isnan(values[0]) else values

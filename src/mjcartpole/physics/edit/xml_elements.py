@@ -1,4 +1,4 @@
-"""The elements of a document that stand for parts of its compiled model, and numbers in them."""
+"""XML elements of a document that stand for parts of its compiled model, and numbers in them."""
 
 import math
 from collections.abc import Sequence
@@ -62,11 +62,12 @@ class Parts:
             )
         return found[index - int(model.body_jntadr[body])]
 
-    def geoms(self, model: mujoco.MjModel, body: int) -> list[tuple[int, Element]]:
-        """Return index and element of each geom of a body.
+    def geoms(self, model: mujoco.MjModel, body: int) -> list[tuple[int, Element, mujoco.MjsGeom]]:
+        """Return index, element, and what it says with its defaults, of each geom of a body.
 
         Raises:
             ConfigError: Some are not written in the body.
+            ModelSyntaxError: An edit has left a number that MuJoCo does not read.
         """
         elements = self.body(model, body).find("geom")
         first = int(model.body_geomadr[body])
@@ -75,7 +76,8 @@ class Parts:
                 f"the geoms of body '{model.body(body).name}' cannot be edited by meaning: not all "
                 "of them are in the document; edit by element"
             )
-        return [(first + i, element) for i, element in enumerate(elements)]
+        whole = [geom for each in self._spec().bodies for geom in each.geoms]
+        return [(first + i, element, whole[first + i]) for i, element in enumerate(elements)]
 
     def actuator(self, index: int) -> Element:
         """Return the element of an actuator, by its number in the compiled model."""
@@ -90,12 +92,7 @@ class Parts:
         from_geoms = [each for each in said if each][-1:] == ["true"]
         return found[0] if found and not from_geoms else None
 
-    def spec(self) -> mujoco.MjSpec:
-        """Return the document with what defaults and classes give to each element.
-
-        Raises:
-            ModelSyntaxError: An edit has left a number that MuJoCo does not read.
-        """
+    def _spec(self) -> mujoco.MjSpec:
         try:
             return mujoco.MjSpec.from_string(self.document.text)
         except ValueError as error:
