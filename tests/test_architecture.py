@@ -1,6 +1,7 @@
 """Imports point one way, and starting up stays light."""
 
 import ast
+import graphlib
 import subprocess
 import sys
 from pathlib import Path
@@ -65,6 +66,31 @@ def test_imports_point_downwards(path):
         other = module.split(".")[1]
         assert other in LAYERS, f"{path} imports {module}, which is above every layer"
         assert LAYERS.index(other) <= LAYERS.index(layer), f"{path} imports {module}"
+
+
+def name_of(path):
+    """A file's name as a module; a package's is that of its __init__.py."""
+    parts = path.relative_to(PACKAGE.parent).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+def imported_files(path, modules):
+    """The modules that a file imports of this package, lazily or for types only, too."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names if alias.name in modules)
+        elif isinstance(node, ast.ImportFrom) and node.module in modules:
+            names = (f"{node.module}.{alias.name}" for alias in node.names)
+            yield from (name if name in modules else node.module for name in names)
+
+
+def test_no_files_import_each_other_in_a_circle():
+    modules = {name_of(path): path for path in SOURCES}
+    graph = {name: set(imported_files(path, modules)) for name, path in modules.items()}
+    try:
+        graphlib.TopologicalSorter(graph).prepare()
+    except graphlib.CycleError as error:
+        pytest.fail(f"files import each other: {' <- '.join(error.args[1])}")
 
 
 @pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(PACKAGE)))

@@ -22,7 +22,8 @@ if TYPE_CHECKING:
     from mjcartpole.learning.config import TrainConfig
     from mjcartpole.learning.policy import Policy
     from mjcartpole.learning.training import TrainResult, train
-    from mjcartpole.physics.load import CartPole, load_model, model_names
+    from mjcartpole.physics.cartpole import CartPole
+    from mjcartpole.physics.load import load_model, model_names
     from mjcartpole.physics.simulation import Simulation
     from mjcartpole.studies.evaluation import Evaluation, evaluate
     from mjcartpole.studies.many import train_many
@@ -49,7 +50,7 @@ __all__ = [
 ]
 
 _HOMES = {
-    "CartPole": "physics.load",
+    "CartPole": "physics.cartpole",
     "CartPoleEnv": "envs.cartpole",
     "CartPoleVectorEnv": "envs.vector",
     "Evaluation": "studies.evaluation",

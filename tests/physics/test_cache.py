@@ -6,7 +6,7 @@ import pickle
 import mujoco
 import pytest
 
-from mjcartpole.physics import cache, load
+from mjcartpole.physics import build, cache
 from mjcartpole.physics.load import load_model, load_shared
 
 REFERENCE = load_model("cartpole").xml
@@ -16,13 +16,13 @@ REFERENCE = load_model("cartpole").xml
 def compiled(monkeypatch):
     """What is compiled while a test runs."""
     monkeypatch.setattr(cache, "_kept", {})
-    seen, compile_it = [], load._compile
+    seen, compile_it = [], build.compile_text
 
     def watch(text, *rest):
         seen.append(text)
         return compile_it(text, *rest)
 
-    monkeypatch.setattr(load, "_compile", watch)
+    monkeypatch.setattr(build, "compile_text", watch)
     return seen
 
 

@@ -9,6 +9,7 @@ import pytest
 from mjcartpole.physics.describe import Description, axis_name, describe
 from mjcartpole.physics.load import load_model, models_folder
 from mjcartpole.physics.simulation import Simulation
+from mjcartpole.task import Task
 
 MODELS = sorted((Path(__file__).parent / "models").glob("*.xml"))
 REFERENCE = (models_folder() / "cartpole.xml").read_text(encoding="utf-8")
@@ -30,6 +31,12 @@ def test_the_reference():
         "integrator  Euler",
         "equations   apply",
     ]
+
+
+def test_where_an_episode_ends_is_the_tasks():
+    for limit, said in ((1.5, "no ends; an episode ends at 1.5 m"), (math.inf, "no ends")):
+        text = describe(load_model(), task=Task("other", x_limit=limit)).text()
+        assert f"rail        along +x, {said}" in text
 
 
 def test_a_rail_along_y_a_hinge_and_a_gear_that_turn_backwards():

@@ -16,15 +16,14 @@ from mjcartpole.errors import (
     ModelSyntaxError,
     NotACartPoleError,
 )
+from mjcartpole.physics.cartpole import INTEGRATORS, with_options
 from mjcartpole.physics.includes import read_whole
 from mjcartpole.physics.load import (
-    INTEGRATORS,
     is_its_document,
     load_model,
     model_names,
     models_folder,
     same_model,
-    with_options,
 )
 
 REFERENCE = (models_folder() / "cartpole.xml").read_text(encoding="utf-8")

@@ -1,15 +1,16 @@
 """No policy can balance some models: it is said of those, and of no other."""
 
+import math
 import re
 
 import numpy as np
 import pytest
 
-from mjcartpole import task
 from mjcartpole.physics import playable
 from mjcartpole.physics.load import load_model, model_names, models_folder
 from mjcartpole.physics.playable import why_unplayable
 from mjcartpole.physics.simulation import Simulation
+from mjcartpole.task import CARTPOLE_V1, Task, max_abs
 
 REFERENCE = (models_folder() / "cartpole.xml").read_text(encoding="utf-8")
 SERVO = re.sub(
@@ -86,6 +87,29 @@ def test_what_hardly_any_policy_can_balance(case, integrator):
     assert f"within {max(lengths)} steps" in line
 
 
+@pytest.mark.parametrize(
+    ("edits", "task", "advice"),
+    [
+        ({"force": 0.1}, Task("swing-up", theta_limit=math.inf), None),
+        ({"force": 0.1}, Task("below level", theta_limit=2), None),
+        ({"force": 1000}, Task("swing-up", theta_limit=math.inf), None),
+        ({"force": 1000}, Task("no ends", x_limit=math.inf), THROWN),
+        ({"force": 1000}, Task("no limit", x_limit=math.inf, theta_limit=math.inf), None),
+        ({"force": 10}, Task("tiny", x_limit=1, theta_limit=0.01, start_high=-0.04), THROWN),
+        ({"option.gravity": "3 0 -9.8", "force": 1}, Task("no ends", x_limit=math.inf), None),
+        (
+            {"option.gravity": "3 0 -9.8", "force": 1},
+            Task("swing-up", theta_limit=math.inf),
+            CARRIED,
+        ),
+    ],
+)
+def test_it_depends_on_the_task(edits, task, advice):
+    line = why_unplayable(load_model("cartpole", edits), task=task)
+    assert (line is None) == (advice is None)
+    assert advice is None or advice in line
+
+
 @both
 @pytest.mark.parametrize("name", model_names())
 def test_the_gallery(name, integrator):
@@ -115,7 +139,7 @@ def lasted(simulation, start, actions) -> int:
     simulation.state = start[: simulation.size]
     for done, action in enumerate(actions, start=1):
         state = simulation.step(simulation.cartpole.controls[action])
-        if task.has_terminated(state[0], task.max_abs(state[2::2])):
+        if CARTPOLE_V1.has_ended(state[0], max_abs(state[2::2])):
             return done
     return len(actions) + 1
 

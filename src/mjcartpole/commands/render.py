@@ -19,7 +19,7 @@ from mjcartpole.learning.naming import shortened
 from mjcartpole.learning.training import TrainResult
 from mjcartpole.media.encoders import find_ffmpeg
 from mjcartpole.media.video import check_path, write_video
-from mjcartpole.physics.load import CartPole
+from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.signals import Interrupted, StopSignals
 from mjcartpole.studies import multi_seed_runs
 from mjcartpole.studies.evaluation import check_count

@@ -33,7 +33,7 @@ from mjcartpole.learning.naming import in_flags, namesakes, run_name
 from mjcartpole.learning.run_model import check_storable
 from mjcartpole.learning.session import CHECKPOINT_EVERY, Session, check_interval
 from mjcartpole.learning.training import Training, TrainResult
-from mjcartpole.physics.load import CartPole
+from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.playable import why_unplayable
 from mjcartpole.physics.simulation import silence_mujoco
 from mjcartpole.signals import Interrupted, StopSignals

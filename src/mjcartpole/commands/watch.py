@@ -20,8 +20,9 @@ from mjcartpole.learning.training import Training, TrainResult
 from mjcartpole.media.renderer import open_renderer
 from mjcartpole.media.video import write_video
 from mjcartpole.output import stdout_problem
+from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.includes import read_whole
-from mjcartpole.physics.load import CartPole, find_model
+from mjcartpole.physics.load import find_model
 from mjcartpole.physics.simulation import silence_mujoco
 from mjcartpole.signals import Interrupted, StopSignals
 from mjcartpole.studies.evaluation import Evaluation, evaluate

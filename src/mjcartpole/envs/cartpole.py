@@ -20,7 +20,8 @@ from mjcartpole.errors import InvalidActionError, ResetNeededError
 from mjcartpole.integrator import Integrator
 from mjcartpole.media.renderer import DEFAULT_HEIGHT, DEFAULT_WIDTH
 from mjcartpole.media.scene import DEFAULT_CAMERA
-from mjcartpole.physics.load import CartPole, Edits, ModelLike, load_shared
+from mjcartpole.physics.cartpole import CartPole
+from mjcartpole.physics.load import Edits, ModelLike, load_shared
 from mjcartpole.physics.simulation import FARTHEST_SANE, Simulation, State, as_one_pole, check_sane
 
 # What `step` needs, as plain globals: the fewest look-ups and no sign to change.

@@ -15,7 +15,8 @@ import numpy.typing as npt
 
 from mjcartpole import task
 from mjcartpole.errors import ConfigError
-from mjcartpole.physics.load import CartPole, Edits, ModelLike, load_model
+from mjcartpole.physics.cartpole import CartPole
+from mjcartpole.physics.load import Edits, ModelLike, load_model
 
 try:
     with warnings.catch_warnings():

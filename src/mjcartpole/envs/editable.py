@@ -6,8 +6,9 @@ from typing import Final
 
 from mjcartpole.errors import ConfigError
 from mjcartpole.integrator import Integrator, check_integrator
+from mjcartpole.physics.cartpole import INTEGRATORS, CartPole, own_copy
 from mjcartpole.physics.edit.edits import edits_of
-from mjcartpole.physics.load import INTEGRATORS, CartPole, Edits, load_shared, own_copy
+from mjcartpole.physics.load import Edits, load_shared
 from mjcartpole.physics.simulation import Simulation
 
 KINEMATICS: Final = {"euler": "", "semi-implicit": "Euler"} | {

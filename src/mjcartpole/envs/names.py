@@ -13,8 +13,8 @@ from mjcartpole import task
 from mjcartpole.envs.editable import Editable
 from mjcartpole.errors import ConfigError, MjCartPoleError, SettingError
 from mjcartpole.physics.bodies import cart_bodies, mass_of, pole_bodies
+from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.edit.rescale import length_of
-from mjcartpole.physics.load import CartPole
 from mjcartpole.physics.parameters import forces_of, pole_of
 from mjcartpole.physics.simulation import LARGEST_SANE, Simulation
 from mjcartpole.physics.structure import directions

@@ -11,7 +11,7 @@ from mjcartpole.errors import ConfigError
 from mjcartpole.media.renderer import DEFAULT_HEIGHT, DEFAULT_WIDTH, Renderer, open_renderer
 from mjcartpole.media.scene import DEFAULT_CAMERA, check_picture
 from mjcartpole.media.window import Window, open_window
-from mjcartpole.physics.load import CartPole
+from mjcartpole.physics.cartpole import CartPole
 
 RenderMode = Literal["human", "rgb_array"]
 

@@ -8,7 +8,8 @@ from typing import Any
 from gymnasium import logger
 from gymnasium.envs.registration import EnvSpec
 
-from mjcartpole.physics.load import CartPole, is_its_document
+from mjcartpole.physics.cartpole import CartPole
+from mjcartpole.physics.load import is_its_document
 
 
 def portable(spec: EnvSpec, cartpole: CartPole) -> EnvSpec:

@@ -18,9 +18,10 @@ from mjcartpole.learning.learner import Learner
 from mjcartpole.learning.loop import in_episode
 from mjcartpole.learning.policy import Policy
 from mjcartpole.learning.stepping import GymPhysics, MujocoPhysics, Physics, Rules, link
+from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.cartpole_v1 import FORCE
 from mjcartpole.physics.library import libmujoco
-from mjcartpole.physics.load import CartPole, ModelLike, load_model
+from mjcartpole.physics.load import ModelLike, load_model
 from mjcartpole.physics.simulation import Simulation, check_sane
 from mjcartpole.task import CARTPOLE_V1, Task, state_names
 

@@ -26,7 +26,7 @@ from mjcartpole.task import (
 )
 
 if TYPE_CHECKING:
-    from mjcartpole.physics.load import CartPole
+    from mjcartpole.physics.cartpole import CartPole
 
 MAX_SEED: Final = 2**128 - 1
 """A generator's state has as many bits."""

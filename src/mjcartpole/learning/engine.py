@@ -7,7 +7,7 @@ from mjcartpole.envs.backend import Backend
 from mjcartpole.errors import ConfigError
 
 if TYPE_CHECKING:
-    from mjcartpole.physics.load import CartPole
+    from mjcartpole.physics.cartpole import CartPole
 
 Engine = Literal["compiled", "python"]
 """`compiled`: the loop compiled by Numba; `python`: the same in Python. They give the same bits."""

@@ -12,7 +12,8 @@ from mjcartpole.errors import ModelError, RunError
 from mjcartpole.files import atomic_write, brief, read_bytes, remove, write_whole
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.physics.assets import is_stored, name_by_content
-from mjcartpole.physics.load import CartPole, load_stored, same_model
+from mjcartpole.physics.cartpole import CartPole
+from mjcartpole.physics.load import load_stored, same_model
 
 MODEL: Final = "model.xml"
 

@@ -39,7 +39,8 @@ from mjcartpole.learning.run_model import (
 )
 from mjcartpole.learning.training import TrainResult
 from mjcartpole.physics.assets import is_stored
-from mjcartpole.physics.load import CartPole, load_stored
+from mjcartpole.physics.cartpole import CartPole
+from mjcartpole.physics.load import load_stored
 from mjcartpole.versions import version_of
 
 VERSIONS: Final = "versions.json"

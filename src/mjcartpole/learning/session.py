@@ -8,7 +8,7 @@ from typing import Final
 from mjcartpole.errors import ConfigError
 from mjcartpole.learning.checkpoints import Checkpoint, checksum, save_checkpoint
 from mjcartpole.learning.training import Training
-from mjcartpole.physics.load import CartPole
+from mjcartpole.physics.cartpole import CartPole
 
 CHECKPOINT_EVERY: Final = 30.0
 """Seconds between two checkpoints."""

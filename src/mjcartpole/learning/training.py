@@ -18,7 +18,7 @@ from mjcartpole.learning.episodes import Columns, EpisodeLog
 from mjcartpole.learning.learner import Learner
 from mjcartpole.learning.loop import learn_episodes
 from mjcartpole.learning.policy import Policy
-from mjcartpole.physics.load import CartPole
+from mjcartpole.physics.cartpole import CartPole
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from mjcartpole import task
 from mjcartpole.physics.bodies import pole_bodies
-from mjcartpole.physics.load import CartPole
+from mjcartpole.physics.cartpole import CartPole
 
 Points = npt.NDArray[np.float64]
 

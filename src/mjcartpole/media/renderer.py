@@ -15,7 +15,7 @@ from mjcartpole.media.quality import DEFAULT_QUALITY, Quality
 from mjcartpole.media.scene import DEFAULT_CAMERA, Box, Scene
 from mjcartpole.media.sketch import SketchRenderer
 from mjcartpole.media.turns import TakesTurns, drawing
-from mjcartpole.physics.load import CartPole
+from mjcartpole.physics.cartpole import CartPole
 
 Kind = Literal["auto", "egl", "osmesa", "glfw", "sketch"]
 """Who draws: an OpenGL backend, the sketch renderer, or the best that works here."""

@@ -19,7 +19,7 @@ from mjcartpole.errors import RenderError
 from mjcartpole.media.angle_limits import Fan, Wedge, box_corners
 from mjcartpole.media.quality import DEFAULT_QUALITY, Quality, level_of
 from mjcartpole.media.view import Points, View
-from mjcartpole.physics.load import CartPole
+from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.structure import directions
 
 Box = tuple[int, int, int, int]

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from mjcartpole.media.backend_probe import try_backend
 from mjcartpole.media.scene import DEFAULT_CAMERA
-from mjcartpole.physics.load import CartPole
+from mjcartpole.physics.cartpole import CartPole
 
 _PATIENCE = 5.0
 """Seconds to wait for the viewer's thread."""

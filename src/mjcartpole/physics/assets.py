@@ -1,4 +1,4 @@
-"""The files that a document names: meshes, height fields, skins, textures, other models.
+"""Assets: the files that a document names, meshes, height fields, skins, textures, other models.
 
 MuJoCo joins a file's name to `meshdir` or `texturedir` of <compiler>, and that to the folder of the
 main file. In an included file a name that leads nowhere from there is sought beside that file; an
@@ -6,15 +6,16 @@ attached model is sought beside the file that names it. `strippath` of the main 
 """
 
 import hashlib
+import io
 import os
 import re
-import stat
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
 from mjcartpole.errors import ModelError, ModelNotFoundError
+from mjcartpole.files import is_file, is_folder
 from mjcartpole.physics.edit.document import Document, Element
 
 MODEL: Final = "model"
@@ -89,7 +90,7 @@ class Folders:
 def find_assets(
     document: Document, folders: Folders, origins: Sequence[Path | None]
 ) -> list[Asset]:
-    """All files that a document names, but for its includes.
+    """Return all files that a document names, but for its includes.
 
     Args:
         document: The document, includes put in their place.
@@ -107,7 +108,7 @@ def find_assets(
 
 
 def strips(document: Document) -> bool:
-    """Whether only the last part of a file's name counts in a document and all it attaches."""
+    """Return whether only the last part of a file's name counts, in attached models as well."""
     return any(each.attributes.get("strippath") == "true" for each in _compilers(document))
 
 
@@ -158,7 +159,7 @@ def _compilers(document: Document) -> list[Element]:
 
 
 def name_by_content(path: Path, content: str | None = None) -> str:
-    """What a file is called in a run.
+    """Return what a file is called in a run.
 
     Args:
         path: Where it is.
@@ -167,32 +168,25 @@ def name_by_content(path: Path, content: str | None = None) -> str:
     Raises:
         ModelNotFoundError: It cannot be read.
     """
-    if content is not None:
-        digest = hashlib.sha256(content.encode())
-    else:
-        try:
-            with path.open("rb") as file:
-                digest = hashlib.file_digest(file, "sha256")
-        except OSError as error:
-            raise ModelNotFoundError(f"a file of the model cannot be read: {error}") from error
+    try:
+        with path.open("rb") if content is None else io.BytesIO(content.encode()) as file:
+            digest = hashlib.file_digest(file, "sha256")
+    except OSError as error:
+        raise ModelNotFoundError(f"a file of the model cannot be read: {error}") from error
     name = f"asset-{digest.hexdigest()[:32]}"
     return name + path.suffix if is_stored(name + path.suffix) else name
 
 
 def is_stored(name: str) -> bool:
-    """Whether a file's name is one that `name_by_content` gives."""
+    """Return whether a file's name is one that `name_by_content` gives."""
     return _STORED.fullmatch(name) is not None
 
 
 def what_else(path: Path) -> str:
-    """What is there in place of a regular file, in words; "" if it is one, or nothing is there."""
-    try:
-        mode = path.stat().st_mode
-    except (OSError, ValueError):
+    """Say what is there in place of a regular file; "" if it is one, or nothing is there."""
+    if is_file(path) or not is_there(path):
         return ""
-    if stat.S_ISREG(mode):
-        return ""
-    return "a folder" if stat.S_ISDIR(mode) else "no regular file"
+    return "a folder" if is_folder(path) else "no regular file"
 
 
 def _asset(
@@ -218,7 +212,7 @@ def _asset(
 
 
 def _given(compilers: list[dict[str, str]], name: str) -> str:
-    """The folder that several <compiler> give together: a later one has the last word."""
+    """Return the folder that several <compiler> give together: the last word counts."""
     folder = ""
     for attributes in compilers:
         folder = attributes.get(name, attributes.get("assetdir", folder))
@@ -226,18 +220,17 @@ def _given(compilers: list[dict[str, str]], name: str) -> str:
 
 
 def _sought(tag: str, main: Path, compilers: list[dict[str, str]]) -> Path:
-    """Where a name of an included file is tried first."""
-    last = {name: value for attributes in compilers for name, value in attributes.items()}
-    both = last.get("assetdir", "")
+    """Return where a name of an included file is tried first."""
     if tag == MODEL:
         return Path.cwd()
-    kinds = {"mesh": "meshdir", "texture": "texturedir"}
-    folder = "" if tag == "flexcomp" else last.get(kinds.get(tag, ""), "") or both
+    last = {name: value for attributes in compilers for name, value in attributes.items()}
+    kind = {"mesh": "meshdir", "texture": "texturedir"}.get(tag, "")
+    folder = "" if tag == "flexcomp" else last.get(kind, "") or last.get("assetdir", "")
     return main / _plain(folder)
 
 
 def is_there(path: Path) -> bool:
-    """Whether a path leads to something."""
+    """Return whether a path leads to something; one that is no path leads to nothing."""
     try:
         path.stat()
     except (OSError, ValueError):
@@ -246,10 +239,10 @@ def is_there(path: Path) -> bool:
 
 
 def _join(folder: Path, name: str) -> Path:
-    """A path as MuJoCo joins it: ".." takes away the folder before it, whatever links there are."""
+    """Join a path as MuJoCo does: ".." takes away the folder before it, be that a link."""
     return Path(os.path.normpath(folder / _plain(name)))
 
 
 def _plain(name: str) -> Path:
-    """MuJoCo takes both slashes on every system."""
+    """Return a name as a path; MuJoCo takes both slashes on every system."""
     return Path(name.replace("\\", "/"))

@@ -13,7 +13,7 @@ from mujoco import batch as mujoco_batch
 
 from mjcartpole.errors import ConfigError, SimulationError
 from mjcartpole.integrator import Integrator, check_integrator
-from mjcartpole.physics.load import CartPole
+from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.simulation import LARGEST_SANE, check_sane, stepping_model
 
 _SHARE: Final = 4
@@ -80,7 +80,7 @@ class BatchSimulation:
         self._until_choice, self._to_beat = _TRIAL, float("nan")
 
     def __getstate__(self) -> tuple[Any, ...]:
-        """What a copy needs to go on bit-equal, on threads of its own."""
+        """Return what a copy needs to go on bit-equal, on threads of its own."""
         if self._is_remembering:
             raise ConfigError(
                 f"many {self.cartpole.name} cannot be copied: with plugins or sleeping bodies a "
@@ -137,7 +137,7 @@ class BatchSimulation:
                 self._choose(self._other)
 
     def sizes(self) -> npt.NDArray[np.float64]:
-        """Absolute values of `state`; the next call overwrites them.
+        """Return absolute values of `state`; the next call overwrites them.
 
         Raises:
             SimulationError: A state is NaN or beyond all bounds.
@@ -159,7 +159,7 @@ class BatchSimulation:
         self._control = batch.bind("ctrl")[:, 0]
 
     def _explicit_euler(self) -> None:
-        """Positions move by the old velocities, velocities as MuJoCo says."""
+        """Move positions by the old velocities, velocities as MuJoCo says."""
         for _ in range(self.cartpole.substeps):
             np.multiply(self._velocities, self._timestep, out=self._moves)
             self._positions += self._moves
@@ -190,18 +190,18 @@ class BatchSimulation:
 
 
 def available_cores() -> int:
-    """Cores that this process may use."""
+    """Return cores that this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
 
 
 def _largest_crew(n: int, substeps: int) -> int:
-    """How many threads may have enough to do: all cores', but for few simulations."""
+    """Return how many threads may have enough to do: all cores', but for few simulations."""
     return max(1, min(available_cores(), n, n * substeps // _SHARE))
 
 
 def _remembers_more_than_its_state(model: mujoco.MjModel) -> bool:
-    """Whether each simulation needs an MjData of its own, since its state is not all there is."""
+    """Return whether a simulation needs an MjData: its state is not all there is."""
     remembering = int(mujoco.mjtEnableBit.mjENBL_SLEEP) | int(mujoco.mjtEnableBit.mjENBL_IPC)
     return bool(model.opt.enableflags & remembering) or model.nplugin > 0

@@ -23,7 +23,7 @@ class HasJoints(Protocol):
 
 
 def subtree(model: mujoco.MjModel, root: int) -> list[int]:
-    """A body and all below it; parents come before their children."""
+    """Return a body and all below it; parents come before their children."""
     inside = [root]
     for body in range(root + 1, model.nbody):
         if int(model.body_parentid[body]) in inside:
@@ -32,18 +32,18 @@ def subtree(model: mujoco.MjModel, root: int) -> list[int]:
 
 
 def moving_bodies(parts: HasJoints) -> list[int]:
-    """Every body that slides, the poles' included."""
+    """Return every body that slides, the poles' included."""
     return _under(parts, parts.slider)
 
 
 def cart_bodies(parts: HasJoints) -> list[int]:
-    """Every body that slides and does not turn."""
+    """Return every body that slides and does not turn."""
     turning = {body for hinge in parts.hinges for body in _under(parts, hinge)}
     return [body for body in moving_bodies(parts) if body not in turning]
 
 
 def pole_bodies(parts: HasJoints, pole: int = 0) -> list[int]:
-    """Every body that turns on a pole's hinge, without those of a pole that stands on it."""
+    """Return all bodies that turn on a pole's hinge, without those of a pole that stands on it."""
     hinge = parts.hinges[pole]
     whole = _under(parts, hinge)
     # MuJoCo counts joints from the cart outwards.
@@ -57,7 +57,7 @@ def pole_bodies(parts: HasJoints, pole: int = 0) -> list[int]:
 
 
 def farthest_from_origin(parts: HasJoints) -> float:
-    """How far what moves stands from the world's origin when all coordinates are 0, m."""
+    """Return how far what moves stands from the world's origin when all coordinates are 0, m."""
     data = mujoco.MjData(parts.model)
     data.qpos[:] = 0.0
     mujoco.mj_kinematics(parts.model, data)
@@ -67,7 +67,7 @@ def farthest_from_origin(parts: HasJoints) -> float:
 
 
 def mass_of(model: mujoco.MjModel, bodies: list[int]) -> float:
-    """Mass of bodies together, kg."""
+    """Return mass of bodies together, kg."""
     return float(sum(float(model.body_mass[body]) for body in bodies))
 
 

@@ -1,12 +1,11 @@
 """What was made from a text, by the text itself: each document is compiled once."""
 
 from collections.abc import Callable, Hashable
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import mujoco
 
-if TYPE_CHECKING:
-    from mjcartpole.physics.load import CartPole
+from mjcartpole.physics.cartpole import CartPole
 
 MOST: Final = 32
 """How many are kept; the oldest make room."""
@@ -14,11 +13,11 @@ MOST: Final = 32
 LARGEST: Final = 2**20
 """Bytes of a document and its compiled model, beyond which it is not kept."""
 
-_kept: "dict[Hashable, CartPole]" = {}
+_kept: dict[Hashable, CartPole] = {}
 
 
-def remembered(key: Hashable, make: "Callable[[], CartPole]") -> "CartPole":
-    """What `make` made of a key, now or before; it is shared, so nobody may change it.
+def remembered(key: Hashable, make: Callable[[], CartPole]) -> CartPole:
+    """Return what `make` made of a key, now or before; it is shared, so nobody may change it.
 
     No lock: a fork in another thread would leave it locked in the child. At worst two threads
     make the same.

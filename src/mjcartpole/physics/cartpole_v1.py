@@ -21,7 +21,7 @@ FORCE = 10.0
 def cartpole_v1_step(
     x: float, x_dot: float, theta: float, theta_dot: float, force: float
 ) -> tuple[float, float, float, float]:
-    """The state 0.02 s later, as gymnasium's `CartPoleEnv` computes it by explicit Euler.
+    """Return the state 0.02 s later, as gymnasium's `CartPoleEnv` computes it by explicit Euler.
 
     Args:
         x: m.

@@ -7,12 +7,12 @@ from typing import Final
 import mujoco
 import numpy as np
 
-from mjcartpole import task
 from mjcartpole.physics.bodies import cart_bodies, mass_of, pole_bodies
+from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.file_steps import method_of
-from mjcartpole.physics.load import CartPole
 from mjcartpole.physics.structure import LEAST_ARM, Directions, Vector, directions, is_servo, push
 from mjcartpole.physics.unmodelled_effects import beyond_equations, beyond_step
+from mjcartpole.task import CARTPOLE_V1, Task
 
 _LABEL_WIDTH: Final = 12
 
@@ -44,14 +44,14 @@ class PoleDescription:
     leans: int
 
     def what(self) -> str:
-        """What it is, in words."""
+        """Return what it is, in words."""
         arm = f"centre of mass {self.com_distance:.6g} m from the hinge"
         if self.com_distance < LEAST_ARM:
             arm = "centre of mass on the hinge, so that it cannot fall"
         return f"{self.joint}, {self.mass:.6g} kg, {arm}"
 
     def angle(self) -> str:
-        """From where its angle is counted, in words."""
+        """Return from where its angle is counted, in words."""
         side = "+x" if self.leans > 0 else "-x"
         words = f"0 is upright, a positive angle leans to {side} of the rail"
         if self.upright:
@@ -84,6 +84,7 @@ class Description:
         integrator: As the document names it.
         cart_mass: All that slides but does not turn, kg.
         rail_limits: Ends of the rail, m; None without.
+        x_limit: How far from its middle an episode ends, m.
         beyond: What acts on the motion and is not in the closed-form equations; empty where
             they apply.
         beyond_step: Why one step of the file's own integrator is not the equations' own.
@@ -104,6 +105,7 @@ class Description:
     integrator: str
     cart_mass: float
     rail_limits: tuple[float, float] | None
+    x_limit: float
     beyond: tuple[str, ...]
     beyond_step: tuple[str, ...]
 
@@ -118,7 +120,7 @@ class Description:
         return not self.beyond
 
     def text(self) -> list[str]:
-        """The description in lines, each with a label."""
+        """Return the description in lines, each with a label."""
         lines = [
             ("cart", f"{self.cart}, {self.cart_mass:.6g} kg"),
             *((f"pole{number}", pole.what()) for number, pole in self._numbered()),
@@ -133,14 +135,15 @@ class Description:
         return [f"{label:<{_LABEL_WIDTH}}{words}" for label, words in lines]
 
     def _numbered(self) -> list[tuple[str, PoleDescription]]:
-        """Each pole with what tells it from the others; nothing where there is one."""
+        """Return each pole with what tells it from the others; nothing where there is one."""
         if len(self.poles) == 1:
             return [("", self.poles[0])]
         return [(f" {number}", pole) for number, pole in enumerate(self.poles, start=1)]
 
     def _limits(self) -> str:
         if self.rail_limits is None:
-            return f", no ends; an episode ends at {task.X_LIMIT:g} m"
+            ends = math.isfinite(self.x_limit)
+            return ", no ends" + (f"; an episode ends at {self.x_limit:g} m" if ends else "")
         low, high = self.rail_limits
         return f", ends at {low:g} m and {high:g} m"
 
@@ -166,17 +169,19 @@ class Description:
         return "apply"
 
 
-def describe(cartpole: CartPole) -> Description:
+def describe(cartpole: CartPole, *, task: Task = CARTPOLE_V1) -> Description:
     """Say what was understood of a model.
 
     Args:
         cartpole: A loaded model.
+        task: What ends an episode.
     """
     model, slider = cartpole.model, cartpole.slider
     found = [directions(cartpole, pole) for pole in range(cartpole.poles)]
     low, high = (push(model, slider, control) for control in cartpole.controls)
     limits = [float(end) for end in model.jnt_range[slider]]
     has_ends = model.jnt_limited[slider] and np.isfinite(limits).any()
+    beyond = beyond_equations(cartpole, task=task)
     return Description(
         name=cartpole.name,
         cart=_joint(model, slider),
@@ -193,8 +198,9 @@ def describe(cartpole: CartPole) -> Description:
         integrator=cartpole.integrator,
         cart_mass=mass_of(model, cart_bodies(cartpole)),
         rail_limits=(limits[0], limits[1]) if has_ends else None,
-        beyond=tuple(beyond_equations(cartpole)),
-        beyond_step=tuple(beyond_step(cartpole, method_of(cartpole))),
+        x_limit=task.x_limit,
+        beyond=tuple(beyond),
+        beyond_step=tuple(beyond_step(cartpole, method_of(cartpole), beyond, task=task)),
     )
 
 
@@ -210,7 +216,7 @@ def _pole(cartpole: CartPole, pole: int, found: Directions) -> PoleDescription:
 
 
 def axis_name(axis: Vector) -> str:
-    """A direction by the world axis that it follows, `"+x"`, or by its numbers."""
+    """Return a direction by the world axis that it follows, `"+x"`, or by its numbers."""
     index = int(np.abs(axis).argmax())
     if abs(axis[index]) > 1 - _NOTHING:
         return f"{'+' if axis[index] > 0 else '-'}{'xyz'[index]}"

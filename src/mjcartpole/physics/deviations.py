@@ -9,8 +9,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
+from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.equations import Parameters
-from mjcartpole.physics.load import CartPole
 from mjcartpole.physics.parameters import (
     differences,
     geometry_of,
@@ -38,7 +38,7 @@ class Deviation:
 
 
 def deviations(cartpole: CartPole, reference: Parameters) -> list[Deviation]:
-    """Everything by which a model's parameters differ from a reference's.
+    """Return everything by which a model's parameters differ from a reference's.
 
     Raises:
         ModelError: The model's parameters cannot be read.
@@ -73,7 +73,7 @@ def _friction(cartpole: CartPole, own: Parameters, reference: Parameters, name: 
 def _gravitys_direction(
     cartpole: CartPole, own: Parameters, reference: Parameters
 ) -> Iterator[Deviation]:
-    """Gravity that is not straight down, where all else stands square to the world's axes."""
+    """Yield gravity that is not straight down, where all else stands square to the world."""
     square = geometry_of(cartpole, directions(cartpole).up)
     angles = {"rail_tilt", "hinge_tilt", "lean"}
     turned = {name for name in angles if getattr(own, name) != getattr(reference, name)}

@@ -63,7 +63,7 @@ _MODES = (0, -1, 1)
 
 
 def friction_forces(frictions: Frictions, inertia: Inertia, velocities: Pair, smooth: Pair) -> Pair:
-    """Dry friction of both joints.
+    """Return dry friction of both joints.
 
     Args:
         frictions: Of the slider and of the hinge; None without.
@@ -88,7 +88,7 @@ def friction_forces(frictions: Frictions, inertia: Inertia, velocities: Pair, sm
 def _try(
     frictions: Frictions, modes: tuple[int, ...], inertia: Inertia, velocities: Pair, smooth: Pair
 ) -> tuple[Pair, Number]:
-    """Forces if each joint grips or slides as said, and by how much that contradicts itself."""
+    """Return the forces if each joint grips or slides as said, and how much that contradicts."""
     grips = [
         1 / friction.softness if friction and not mode else 0.0
         for friction, mode in zip(frictions, modes, strict=True)
@@ -118,7 +118,7 @@ def _accelerations(
     velocities: Pair,
     smooth: Pair,
 ) -> Pair:
-    """Accelerations with some joints gripped, each as if heavier, and others sliding."""
+    """Return accelerations with some joints gripped, each as if heavier, and others sliding."""
     slider, shared, hinge = inertia
     rates = [friction.rate if friction else 0.0 for friction in frictions]
     pulls = [

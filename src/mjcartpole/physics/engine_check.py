@@ -13,9 +13,9 @@ import numpy as np
 import numpy.typing as npt
 
 from mjcartpole.physics.bodies import farthest_from_origin
+from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.equations import Parameters, coefficients
-from mjcartpole.physics.free_region import WIDE_BOX, FreeRegion
-from mjcartpole.physics.load import CartPole
+from mjcartpole.physics.free_region import FreeRegion, wide_box
 from mjcartpole.physics.parameters import joint_label, label
 from mjcartpole.physics.structure import push
 
@@ -37,7 +37,7 @@ _KINDS: Final = tuple(sorted({n for n in dir(mujoco.MjData) if n.startswith("qfr
 
 
 def unexplained_forces(cartpole: CartPole, p: Parameters, region: FreeRegion) -> dict[str, str]:
-    """Kinds of forces that act on the two joints beyond the equations.
+    """Return kinds of forces that act on the two joints beyond the equations.
 
     Args:
         cartpole: A model of one pole.
@@ -48,7 +48,7 @@ def unexplained_forces(cartpole: CartPole, p: Parameters, region: FreeRegion) ->
         A phrase for each kind: the name of MuJoCo's array, and where and how much.
     """
     rng = np.random.default_rng(0)
-    low, high = region.box(WIDE_BOX)
+    low, high = region.box(wide_box(region.task))
     offset = farthest_from_origin(cartpole)
     found: dict[str, tuple[float, str]] = {}
     data = mujoco.MjData(cartpole.model)
@@ -70,7 +70,7 @@ def _excesses(
     control: float,
     offset: float,
 ) -> Iterator[tuple[str, float, int]]:
-    """Of each kind: the largest force beyond the equations' own, and on which joint."""
+    """Yield of each kind the largest force beyond the equations' own, and on which joint."""
     joints = list(cartpole.joints)
     mujoco.mj_resetData(cartpole.model, data)
     data.qpos[joints], data.qvel[joints] = state[[0, 2]], state[[1, 3]]
@@ -92,7 +92,7 @@ def _excesses(
 def _expected(
     cartpole: CartPole, p: Parameters, state: Vector, control: float
 ) -> dict[str, Vector]:
-    """The forces that the equations have, by MuJoCo's kinds."""
+    """Return the forces that the equations have, by MuJoCo's kinds."""
     k, (_, x_dot, theta, theta_dot) = coefficients(p), state
     swing = (k.coupling * np.sin(theta) + k.crossing * np.cos(theta)) * theta_dot**2
     turn = k.weight * np.sin(theta) + k.leaning * np.cos(theta)
@@ -112,14 +112,14 @@ def _expected(
 
 
 def _whole_weight(p: Parameters, state: Vector, offset: float) -> float:
-    """What weight and rotation would be with the farthest arm that positions round by, N or N m."""
+    """Return what weight and rotation would be with the arm positions round by, N or N m."""
     arm = offset + abs(state[0])
     pull = p.gravity + arm * state[3] ** 2
     return float((p.cart_mass + p.pole_mass) * pull * max(arm, 1.0) * _POSITIONS)
 
 
 def _dry_friction(data: mujoco.MjData) -> Vector:
-    """The part of the constraint forces that is dry friction of joints, shape (nv,)."""
+    """Return the part of the constraint forces that is dry friction of joints, shape (nv,)."""
     forces: Vector = np.zeros_like(data.qvel)
     for row in range(data.nefc):
         if data.efc_type[row] == mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF:
@@ -128,7 +128,7 @@ def _dry_friction(data: mujoco.MjData) -> Vector:
 
 
 def _phrase(cartpole: CartPole, data: mujoco.MjData, kind: str, size: float, joint: int) -> str:
-    """What acts, on what, and how much; an actuator that helps is named."""
+    """Return what acts, on what, and how much; an actuator that helps is named."""
     model, by = cartpole.model, ""
     if kind == "qfrc_actuator":
         helpers = [

@@ -155,7 +155,7 @@ def uniform_rod(
     force: float = 10.0,
     timestep: float = task.CONTROL_STEP,
 ) -> Parameters:
-    """CartPole-v1's kind of cart-pole: a uniform thin rod, no friction. The defaults are its own.
+    """Return CartPole-v1's kind of cart-pole: a uniform rod without friction, by default its own.
 
     Args:
         cart_mass: M, kg.
@@ -210,7 +210,7 @@ class Coefficients(NamedTuple):
 
 
 def coefficients(p: Parameters, implicit_damping: float = 0.0) -> Coefficients:
-    """The coefficients of a cart-pole's two equations.
+    """Return the coefficients of a cart-pole's two equations.
 
     Args:
         p: The cart-pole.
@@ -246,7 +246,7 @@ def solve(
     force: Number,
     torque: Number = 0.0,
 ) -> tuple[Number, Number]:
-    """Both accelerations, by Cramer's rule (equations and source: see the module).
+    """Return both accelerations, by Cramer's rule (equations and source: see the module).
 
     Args:
         k: The coefficients.
@@ -273,7 +273,7 @@ def solve(
 def _pushes(
     p: Parameters, x_dot: Number, theta: Number, theta_dot: Number, force: Number
 ) -> tuple[Number, Number]:
-    """What acts on slider and hinge beside damping and gravity: the push, and dry friction."""
+    """Return what acts on slider and hinge beside damping and gravity, friction included."""
     if p.slider_friction is None and p.hinge_friction is None:
         return force, 0.0
     k = coefficients(p)
@@ -291,13 +291,13 @@ def _pushes(
 def accelerations(
     p: Parameters, x_dot: Number, theta: Number, theta_dot: Number, force: Number
 ) -> tuple[Number, Number]:
-    """`(x_acc, theta_acc)` of a cart-pole in m/s^2 and rad/s^2; see `solve` for the arguments."""
+    """Return `(x_acc, theta_acc)` in m/s^2 and rad/s^2; see `solve` for the arguments."""
     pushes = _pushes(p, x_dot, theta, theta_dot, force)
     return solve(coefficients(p), x_dot, theta, theta_dot, *pushes)
 
 
 def energy(p: Parameters, state: npt.ArrayLike) -> Array:
-    """Kinetic and potential energy together, J, shape (...,); the pole weighs nothing at the hinge.
+    """Return kinetic and potential energy together, J, shape (...,).
 
     Constant where nothing pushes or brakes. The cart has none of its own at x = 0.
 
@@ -317,7 +317,7 @@ def energy(p: Parameters, state: npt.ArrayLike) -> Array:
 
 
 def derivative(p: Parameters, state: npt.ArrayLike, force: npt.ArrayLike) -> Array:
-    """Time derivative of the state, shape (..., 4).
+    """Return time derivative of the state, shape (..., 4).
 
     Args:
         p: The cart-pole.
@@ -336,7 +336,7 @@ def step(
     integrator: Integrator = "gym",
     h: float | None = None,
 ) -> Array:
-    """The state one physics step later, shape (..., 4).
+    """Return the state one physics step later, shape (..., 4).
 
     Args:
         p: The cart-pole.
@@ -367,7 +367,7 @@ def step(
 def rk4_step(
     p: Parameters, state: npt.ArrayLike, force: npt.ArrayLike, h: float | None = None
 ) -> Array:
-    """The state one step of the classic Runge-Kutta method later, shape (..., 4).
+    """Return the state one step of the classic Runge-Kutta method later, shape (..., 4).
 
     Args:
         p: The cart-pole.
@@ -385,7 +385,7 @@ def rk4_step(
 
 
 def _split(state: npt.ArrayLike) -> tuple[Array, Array, Array, Array]:
-    """The four columns of states of shape (..., 4)."""
+    """Return the four columns of states of shape (..., 4)."""
     values = np.asarray(state)
     if values.ndim == 0 or values.shape[-1] != 4:
         raise ConfigError(

@@ -13,15 +13,15 @@ import numpy as np
 import numpy.typing as npt
 
 from mjcartpole.physics import equations
+from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.equations import Array, Parameters, coefficients
-from mjcartpole.physics.load import CartPole
 from mjcartpole.physics.parameters import is_on
 
 METHODS = ("Euler", "Euler without eulerdamp", "implicitfast", "implicit", "RK4")
 
 
 def method_of(cartpole: CartPole) -> str:
-    """By which of `METHODS` a file has itself stepped; another integrator's name is given as it is.
+    """Return by which of `METHODS` a file has itself stepped, or another integrator's own name.
 
     `discrete` differs from `implicitfast` only in how it solves constraints.
     """
@@ -32,7 +32,7 @@ def method_of(cartpole: CartPole) -> str:
 
 
 def file_step(p: Parameters, state: npt.ArrayLike, force: npt.ArrayLike, method: str) -> Array:
-    """The state one physics step later, shape (..., 4).
+    """Return the state one physics step later, shape (..., 4).
 
     Args:
         p: The cart-pole.
@@ -55,7 +55,7 @@ def file_step(p: Parameters, state: npt.ArrayLike, force: npt.ArrayLike, method:
 
 
 def _implicit(p: Parameters, state: Array, force: Array) -> Array:
-    """New velocities, with what changes with the velocities taken from the end of the step."""
+    """Return new velocities; what changes with them is taken from the end of the step."""
     h, k = p.timestep, coefficients(p)
     x_dot, theta, theta_dot = state[..., 1], state[..., 2], state[..., 3]
     x_acc, theta_acc = equations.accelerations(p, x_dot, theta, theta_dot, force)
@@ -74,7 +74,7 @@ def _implicit(p: Parameters, state: Array, force: Array) -> Array:
 
 
 def _moved(p: Parameters, before: npt.ArrayLike, after: Array) -> Array:
-    """A state whose positions have moved by the new velocities."""
+    """Return a state whose positions have moved by the new velocities."""
     moved, start = after.copy(), np.asarray(before)
     for place in (0, 2):
         moved[..., place] = start[..., place] + p.timestep * after[..., place + 1]

@@ -1,4 +1,4 @@
-"""A document is compiled where it can do no harm before it is compiled here.
+"""Guard: a document is compiled where it can do no harm before it is compiled here.
 
 MuJoCo does as it is told where a document asks for a million copies, a texture of many gigabytes
 or a model that attaches itself, and there are more such ways than can be listed. A trial in a
@@ -49,11 +49,7 @@ _stood: set[bytes] = set()
 
 
 def compile_document(document: Document, name: str) -> mujoco.MjModel:
-    """Compile a document that names its files by absolute paths.
-
-    Args:
-        document: The document.
-        name: What a person calls it.
+    """Compile a document that a person calls by a name, and that names its files by full paths.
 
     Raises:
         ModelSyntaxError: MuJoCo does not accept it.
@@ -69,24 +65,19 @@ def compile_document(document: Document, name: str) -> mujoco.MjModel:
 
 
 def one_line(message: str) -> str:
-    """What MuJoCo says, in one line."""
+    """Return what MuJoCo says in one line."""
     return " ".join(message.split()).removeprefix("XML Error: ").removeprefix("Error: ")
 
 
 def _is_plain(document: Document) -> bool:
     elements = list(document.root.walk())
-    return len(elements) <= _MOST_PLAIN and not any(
-        element.tag not in _PLAIN or any(map(_COSTLY.fullmatch, element.attributes))
-        for element in elements
+    return len(elements) <= _MOST_PLAIN and all(
+        each.tag in _PLAIN and not any(map(_COSTLY.fullmatch, each.attributes)) for each in elements
     )
 
 
 def _try(text: str, name: str) -> None:
-    """Compile and step a document in another process, once as long as its text is the same.
-
-    Raises:
-        ModelError: It does not end well.
-    """
+    """Compile and step a document in another process, once as long as its text is the same."""
     library, checksum = libmujoco(), hashlib.sha256(text.encode()).digest()
     if checksum in _stood or not (library and sys.executable) or hasattr(sys, "frozen"):
         return

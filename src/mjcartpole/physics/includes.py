@@ -1,4 +1,4 @@
-"""An MJCF is read with its includes in their place and with absolute names of its other files.
+"""Includes: an MJCF read whole, they in their place and other files by absolute names.
 
 MuJoCo reads `<include>` relative to the folder of the main file or of the file that includes, and
 each file once. How much memory and time a document takes is found out by a trial (see guard.py);
@@ -7,7 +7,7 @@ here it is only seen to that reading it is no danger.
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Final
 
@@ -34,7 +34,7 @@ MOST_FILES: Final = 50
 
 
 def read_text(path: Path, name: str = "", most: int = LARGEST_FILE) -> str:
-    """The text of a file.
+    """Return the text of a file.
 
     Args:
         path: Where it is.
@@ -70,7 +70,7 @@ def read_text(path: Path, name: str = "", most: int = LARGEST_FILE) -> str:
 def read_whole(
     text: str, name: str, folder: Path, inside: Sequence[Path] | None = None
 ) -> Document:
-    """The document with its includes in their place, and with absolute names of its other files.
+    """Return a document with its includes in their place and absolute names of its other files.
 
     Args:
         text: As it was written. Without includes and other files it stays so to the last character.
@@ -91,7 +91,7 @@ def read_whole(
 
 
 def portable(text: str) -> tuple[str, dict[str, Path | str]]:
-    """A document that names its files by their content, without any folder.
+    """Return a document that names its files by their content, without any folder.
 
     Args:
         text: As `read_whole` gives it.
@@ -125,16 +125,14 @@ class _Reader:
     included: set[str] = field(default_factory=set)
 
     def read(self, text: str, name: str) -> tuple[Document, list[Asset]]:
-        """A document with its includes in their place, and the files that it names."""
+        """Return a document with its includes in their place, and the files that it names."""
         text, origins = self._flat(text, name, None)
         document = _parse(text, name)
         root = document.root.tag
         if root != "mujoco":
             urdf = " (a URDF; MuJoCo can save it as MJCF)" if root == "robot" else ""
             raise _invalid(name, f"its outermost element is <{root}>{urdf}, not <mujoco>")
-        self.folders = Folders(
-            self.folders.main, self.folders.inside, self.folders.strip or strips(document)
-        )
+        self.folders = replace(self.folders, strip=self.folders.strip or strips(document))
         assets = find_assets(document, self.folders, origins)
         for asset in assets:
             called = f"'{asset.name}', which {name} names as the file of a <{asset.element.tag}>,"
@@ -143,17 +141,16 @@ class _Reader:
         return document, assets
 
     def attached(self, asset: Asset, name: str) -> tuple[Document, list[Asset]]:
-        """A model that a document attaches, and the files that it names in turn."""
+        """Return a model that a document attaches, and the files that it names in turn."""
         who = f"'{asset.name}', which {name} attaches,"
         text = self._text(asset.path, who)
-        below = Folders(asset.path.parent, self.folders.inside, self.folders.strip)
-        reader = _Reader(below, self.left)
+        reader = _Reader(replace(self.folders, main=asset.path.parent), self.left)
         found = reader.read(text, who)
         self.left = reader.left
         return found
 
     def _flat(self, text: str, name: str, origin: Path | None) -> tuple[str, list[Path | None]]:
-        """A document's text, or an included one's content, and what each element came from."""
+        """Return a document's text, or an included one's content, and its elements' origins."""
         document = _parse(text, name)
         content = text.encode()
         start, end = (0, len(content)) if origin is None else document.content(document.root)
@@ -185,7 +182,7 @@ class _Reader:
         return self._flat(self._text(path, who), f"'{file}'", path.parent)
 
     def _included_file(self, file: str, name: str, origin: Path | None) -> Path:
-        """Where an included file is: beside the main file, else beside the one that includes it."""
+        """Find an included file: beside the main file, else beside the one that includes it."""
         if not file:
             raise ModelNotFoundError(
                 f"{name} cannot be read whole: an <include> of it names no file; "
@@ -225,14 +222,13 @@ def _store(
     for asset in assets:
         if asset.path in names:
             continue
+        content = None
         if asset.element.tag == MODEL:
             child, theirs = reader.attached(asset, "the document")
             _store(reader, child, theirs, files)
-            names[asset.path] = name_by_content(asset.path, child.text)
-            files[names[asset.path]] = child.text
-        else:
-            names[asset.path] = name_by_content(asset.path)
-            files[names[asset.path]] = asset.path
+            content = child.text
+        names[asset.path] = name_by_content(asset.path, content)
+        files[names[asset.path]] = asset.path if content is None else content
     store_names(document, assets, names)
 
 

@@ -18,7 +18,7 @@ _REST: Final = np.zeros(4)
 
 
 def linearisation(p: Parameters) -> tuple[Array, Array]:
-    """A and B of `state_dot = A state + B force` near rest at angle 0.
+    """Return a and B of `state_dot = A state + B force` near rest at angle 0.
 
     Returns:
         A, shape (4, 4), and B, shape (4, 1); SI units.
@@ -35,7 +35,7 @@ def step_matrix(
     state: npt.ArrayLike = _REST,
     force: float = 0.0,
 ) -> Array:
-    """Jacobian of one `equations.step`, shape (4, 4): what it makes of a small error.
+    """Return jacobian of one `equations.step`, shape (4, 4): what it makes of a small error.
 
     Args:
         p: The cart-pole.
@@ -51,7 +51,7 @@ def step_matrix(
 
 
 def spectral_radius(p: Parameters, integrator: Integrator = "gym", h: float | None = None) -> float:
-    """How much one step multiplies a small error near rest at angle 0, in the long run.
+    """Return how much one step multiplies a small error near rest at angle 0, in the long run.
 
     The largest absolute eigenvalue of `step_matrix`; see there for the arguments. The cart's
     position makes a double eigenvalue 1, so a pole that hangs, where nothing grows, gives 1 to
@@ -64,5 +64,5 @@ def spectral_radius(p: Parameters, integrator: Integrator = "gym", h: float | No
 
 
 def _jacobian(function: Callable[[Array], Array], state: Array) -> Array:
-    """Column j is what coordinate j does, shape (4, 4)."""
+    """Return the Jacobian of a function of states, shape (4, 4), by a complex step."""
     return np.asarray(function(state + 1j * _H * np.eye(4)).imag.T / _H)

@@ -17,9 +17,9 @@ import numpy.typing as npt
 from mjcartpole import task
 from mjcartpole.errors import ModelError, NotACartPoleError
 from mjcartpole.physics.bodies import cart_bodies, mass_of, pole_bodies
+from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.dry_friction import DryFriction
 from mjcartpole.physics.equations import Parameters
-from mjcartpole.physics.load import CartPole
 from mjcartpole.physics.structure import directions, push
 
 TILT: Final = 1e-14
@@ -29,7 +29,7 @@ Vector = npt.NDArray[np.float64]
 
 
 def read_parameters(cartpole: CartPole) -> Parameters:
-    """The numbers that the equations need, from a compiled model.
+    """Return the numbers that the equations need, from a compiled model.
 
     They are those that act: what an option flag of the file switches off is 0. All bodies below
     the hinge count as one rigid pole, all others below the slider as the cart. A motor's armature
@@ -77,12 +77,12 @@ def read_parameters(cartpole: CartPole) -> Parameters:
 
 
 def is_on(model: mujoco.MjModel, flag: mujoco.mjtDisableBit) -> bool:
-    """Whether a model's option flags leave something switched on."""
+    """Return whether a model's option flags leave something switched on."""
     return not model.opt.disableflags & int(flag)
 
 
 def can_push(cartpole: CartPole) -> bool:
-    """Whether the motor acts, by the file's flags."""
+    """Return whether the motor acts, by the file's flags."""
     model = cartpole.model
     group = int(model.actuator_group[cartpole.motor])
     enabled = not (0 <= group < 31 and model.opt.disableactuator >> group & 1)
@@ -90,7 +90,7 @@ def can_push(cartpole: CartPole) -> bool:
 
 
 def feedback_of(cartpole: CartPole) -> float:
-    """How much the motor itself brakes the cart, N s/m: velocity feedback."""
+    """Return how much the motor itself brakes the cart, N s/m: velocity feedback."""
     model, motor = cartpole.model, cartpole.motor
     if model.actuator_biastype[motor] != mujoco.mjtBias.mjBIAS_AFFINE or not can_push(cartpole):
         return 0.0
@@ -99,7 +99,7 @@ def feedback_of(cartpole: CartPole) -> float:
 
 
 def _acting_forces(cartpole: CartPole) -> tuple[float, float]:
-    """Push along the slider by either action at rest at x = 0, after all that clips it, N."""
+    """Return the push of either action at rest at x = 0, after all that clips it, N."""
     if not can_push(cartpole):
         return 0.0, 0.0
     left, right = (push(cartpole.model, cartpole.slider, control) for control in cartpole.controls)
@@ -107,7 +107,7 @@ def _acting_forces(cartpole: CartPole) -> tuple[float, float]:
 
 
 def _frictions(cartpole: CartPole) -> dict[int, DryFriction]:
-    """Dry friction by joint, with the softness that MuJoCo's constraint solver gives it."""
+    """Return dry friction by joint, with the softness that MuJoCo's constraint solver gives it."""
     # As explicit Euler and the other integrators solve it; `discrete` has its own way.
     model = copy.copy(cartpole.model)
     model.opt.integrator = mujoco.mjtIntegrator.mjINT_EULER
@@ -139,7 +139,7 @@ class _Geometry(NamedTuple):
 
 
 def geometry_of(cartpole: CartPole, up: Vector | None = None) -> _Geometry:
-    """Angles between rail, hinge, pole and what is up; what rounding alone can make is 0.
+    """Return the angles between rail, hinge, pole and up; what rounding can make is 0.
 
     Args:
         cartpole: A model of one pole.
@@ -170,13 +170,13 @@ def geometry_of(cartpole: CartPole, up: Vector | None = None) -> _Geometry:
 
 
 def _angle(axis: Vector, other: Vector) -> float:
-    """Between an axis and the plane that is square to another, rad."""
+    """Return between an axis and the plane that is square to another, rad."""
     sine = float(axis @ other)
     return 0.0 if abs(sine) < TILT else math.asin(min(max(sine, -1.0), 1.0))
 
 
 def _up(cartpole: CartPole) -> Vector:
-    """Against gravity, unit, shape (3,); without gravity the world axis that counts as up."""
+    """Return what is up, unit, shape (3,): against gravity, or the axis that counts as up."""
     gravity = cartpole.model.opt.gravity
     if not gravity.any():
         return directions(cartpole).up
@@ -185,7 +185,7 @@ def _up(cartpole: CartPole) -> Vector:
 
 
 def several_poles(cartpole: CartPole) -> str:
-    """Why the equations do not cover a model with several poles."""
+    """Say why the equations do not cover a model with several poles."""
     return f"{task.in_words(cartpole.poles)}, and the equations are those of one"
 
 
@@ -195,7 +195,7 @@ def take(p: Parameters, other: Parameters, names: Iterable[str]) -> Parameters:
 
 
 def differences(p: Parameters, q: Parameters, rtol: float = 1e-12) -> list[str]:
-    """What `p` has instead of what `q` has, such as "pole mass 0.1001 instead of 0.1".
+    """Return what `p` has instead of what `q` has, such as "pole mass 0.1001 instead of 0.1".
 
     Args:
         p: What is.
@@ -227,7 +227,7 @@ def _values(p: Parameters) -> Iterator[tuple[str, float]]:
 
 
 def _digits(value: float, other: float) -> str:
-    """The fewest digits, but at least six, that tell a value from another."""
+    """Return the fewest digits, but at least six, that tell a value from another."""
     for digits in range(6, 17):
         text = f"{value:.{digits}g}"
         if text != f"{other:.{digits}g}":
@@ -254,7 +254,7 @@ class _Axes:
 
 
 def axes_of(cartpole: CartPole, pole: int = 0) -> _Axes:
-    """Where the cart's joint and a pole's point when all coordinates are 0."""
+    """Return where the cart's joint and a pole's point when all coordinates are 0."""
     model = cartpole.model
     data = mujoco.MjData(model)
     data.qpos[:] = 0.0  # angle 0, which a joint's `ref` can move away from the file's own pose
@@ -266,7 +266,7 @@ def axes_of(cartpole: CartPole, pole: int = 0) -> _Axes:
 
 
 def pole_of(cartpole: CartPole, pole: int = 0) -> _Pole:
-    """A pole as one rigid body, by the parallel axis theorem.
+    """Return a pole as one rigid body, by the parallel axis theorem.
 
     Positions are composed in the frame of the hinge's body, not taken from the world: there a
     pole on a table 1.3 m high has lost the last digit of its length.
@@ -283,12 +283,12 @@ def pole_of(cartpole: CartPole, pole: int = 0) -> _Pole:
         if body != root:
             position, turn = frames[int(model.body_parentid[body])]
             place = position + turn @ model.body_pos[body]
-            frames[body] = place, turn @ _rotation(model.body_quat[body])
+            frames[body] = place, turn @ rotation(model.body_quat[body])
         position, turn = frames[body]
         # The engine takes a centre of mass nearer than 1e-6 m for in place.
         in_place = model.body_sameframe[body] == mujoco.mjtSameFrame.mjSAMEFRAME_BODY
         places.append(position if in_place else position + turn @ model.body_ipos[body])
-        along = axis @ turn @ _rotation(model.body_iquat[body])
+        along = axis @ turn @ rotation(model.body_iquat[body])
         moments.append(float(along * along @ model.body_inertia[body]))
     com = places[0].copy()
     for body, place in zip(bodies, places, strict=True):
@@ -300,14 +300,15 @@ def pole_of(cartpole: CartPole, pole: int = 0) -> _Pole:
     return _Pole(mass, com - model.jnt_pos[hinge], inertia)
 
 
-def _rotation(quaternion: Vector) -> Vector:
+def rotation(quaternion: Vector) -> Vector:
+    """Return the rotation matrix of a quaternion, shape (3, 3)."""
     matrix = np.empty(9)
     mujoco.mju_quat2Mat(matrix, quaternion)
     return matrix.reshape(3, 3)
 
 
 def forces_of(cartpole: CartPole) -> tuple[float, float]:
-    """Push along the slider by action 0 and by action 1, N."""
+    """Return push along the slider by action 0 and by action 1, N."""
     model = cartpole.model
     motor = cartpole.motor
     gear, gain = float(model.actuator_gear[motor, 0]), float(model.actuator_gainprm[motor, 0])
@@ -316,12 +317,12 @@ def forces_of(cartpole: CartPole) -> tuple[float, float]:
 
 
 def joint_label(model: mujoco.MjModel, index: int) -> str:
-    """A joint by its name, or by its number where it has none."""
+    """Return a joint by its name, or by its number where it has none."""
     return label(model, mujoco.mjtObj.mjOBJ_JOINT, index)
 
 
 def label(model: mujoco.MjModel, kind: mujoco.mjtObj, index: int, word: str | None = None) -> str:
-    """How a person finds an element: "joint 'slider'", or "joint 0" if it has no name."""
+    """Return how a person finds an element: "joint 'slider'", or "joint 0" if it has no name."""
     word = kind.name.removeprefix("mjOBJ_").lower() if word is None else word
     name = mujoco.mj_id2name(model, kind, index)
     return f"{word} '{name}'".lstrip() if name else f"{word} {index}".lstrip()

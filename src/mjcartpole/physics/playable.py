@@ -1,21 +1,22 @@
-"""Whether some policy may balance a model, or every one loses.
+"""Playable or not: whether some policy may balance a model, or every one loses.
 
 Two proofs, from starts drawn as episodes draw them. By exhaustion: every sequence of actions ends
 the episode within a few steps. By comparison: where a steady push to either side lets the pole
 fall, or the cart leave, to the same side, every policy lies between the two and ends there as well.
 """
 
+import math
 from collections import Counter
 from typing import Final
 
 import mujoco
 import numpy as np
 
-from mjcartpole import task
 from mjcartpole.errors import SimulationError
 from mjcartpole.integrator import Integrator
-from mjcartpole.physics.load import CartPole
+from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.simulation import Simulation, State
+from mjcartpole.task import CARTPOLE_V1, Task, max_abs
 
 STARTS: Final = 8
 
@@ -47,19 +48,22 @@ _ADVICE: Final = {
 }
 
 
-def why_unplayable(cartpole: CartPole, integrator: Integrator = "gym") -> str | None:
+def why_unplayable(
+    cartpole: CartPole, integrator: Integrator = "gym", *, task: Task = CARTPOLE_V1
+) -> str | None:
     """Say in one line that no policy can balance a model, where that is proven, or hardly any.
 
     Args:
         cartpole: The model.
         integrator: Who moves it.
+        task: What ends an episode, and where it starts.
 
     Returns:
         The line; None where a policy may well balance it, or nothing is proven.
     """
-    search = _Search(Simulation(cartpole, integrator))
+    search = _Search(Simulation(cartpole, integrator), task)
     starts = np.random.default_rng(0).uniform(
-        task.RESET_LOW, task.RESET_HIGH, (STARTS, search.simulation.size)
+        task.start_low, task.start_high, (STARTS, search.simulation.size)
     )
     try:
         lost = search.lost(starts.tolist())
@@ -93,18 +97,19 @@ class _Search:
 
     Attributes:
         simulation: Moves the model.
+        task: The rules.
         steps: Physics steps so far, where Runge-Kutta's count four times.
     """
 
-    def __init__(self, simulation: Simulation) -> None:
-        self.simulation = simulation
+    def __init__(self, simulation: Simulation, task: Task = CARTPOLE_V1) -> None:
+        self.simulation, self.task = simulation, task
         self.steps = 0
         self._controls = simulation.cartpole.controls
         rk4 = simulation.model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4
         self._cost = simulation.cartpole.substeps * (4 if rk4 else 1)
 
     def lost(self, starts: list[State]) -> list[tuple[str, int]]:
-        """How, and within how many control steps, each start is lost that no policy survives.
+        """Return how, and within how many steps, each start is lost that no policy survives.
 
         It stops where too few can be lost.
         """
@@ -116,7 +121,7 @@ class _Search:
         return found
 
     def thrown(self, start: State) -> tuple[str, int] | None:
-        """Whether all sequences of actions end, and after how many control steps the last one."""
+        """Say whether all sequences of actions end, and after how many steps the last one."""
         longest, trials, open_states = 0, 0, [(start, 0)]
         while open_states:
             state, done = open_states.pop()
@@ -124,54 +129,58 @@ class _Search:
                 return None
             after = [self._step(state, control) for control in self._controls]
             trials, longest = trials + len(after), max(longest, done + 1)
-            in_play = [each for each in after if not _has_ended(each)]
+            in_play = [each for each in after if not self._has_ended(each)]
             # The best one last, which is next.
             open_states += [(each, done + 1) for each in sorted(in_play, key=_danger, reverse=True)]
         return "thrown", longest
 
     def overcome(self, start: State) -> tuple[str, int] | None:
-        """Whether both steady pushes end on the same side, and after how many control steps.
+        """Say whether both steady pushes end on the same side, and after how many steps.
 
         The comparison holds for one pole, and where nothing depends on the cart's place.
         """
         if self.simulation.cartpole.poles > 1:
             return None
-        fallen = self._same_side(start, 2, task.THETA_LIMIT)
-        if fallen:
-            return "fallen", fallen
+        # Below the horizontal a push turns the pole the other way.
+        if self.task.theta_limit < math.pi / 2:
+            fallen = self._same_side(start, 2, self.task.theta_limit)
+            if fallen:
+                return "fallen", fallen
+        if not (math.isfinite(self.task.x_limit) and self._one_way(start)):
+            return None
         # A pole that swings right round moves the cart; twice the limit is out of its reach.
-        carried = self._one_way(start) and self._same_side(start, 0, 2 * task.X_LIMIT)
+        carried = self._same_side(start, 0, 2 * self.task.x_limit)
         return ("carried", carried) if carried else None
 
     def held(self, control: float) -> int:
-        """Control steps until one action, held, ends an episode; `COARSE` + 1 if more."""
+        """Return control steps until one action, held, ends an episode; `COARSE` + 1 if more."""
         self.simulation.set_state((0.0,) * self.simulation.size)
         return next(
-            (n for n in range(1, COARSE + 1) if _has_ended(self.simulation.step(control))),
+            (n for n in range(1, COARSE + 1) if self._has_ended(self.simulation.step(control))),
             COARSE + 1,
         )
 
     def _one_way(self, start: State) -> bool:
-        """Whether the cart sets off to the same side by either action."""
+        """Return whether the cart sets off to the same side by either action."""
         both = np.array(self._controls)
         left, right = self.simulation.accelerations(np.array([start, start]), both)[:, 0]
         return bool(left * right > 0)
 
     def _same_side(self, start: State, place: int, limit: float) -> int:
-        """Control steps until either steady push has driven a value out on one side; 0 if not."""
+        """Return the steps until either steady push has driven a value out on one side; else 0."""
         left, right = self._controls
         side, steps = self._pushed(start, left, place, limit)
         other, more = self._pushed(start, right, place, limit) if side else (0, 0)
         return max(steps, more) if side and side == other else 0
 
     def _pushed(self, start: State, control: float, place: int, limit: float) -> tuple[int, int]:
-        """To which side a value of the state leaves its limits under a steady push, and when.
+        """Find to which side a steady push drives a value of the state out, and when.
 
         Returns:
             -1 or 1, or 0 where it stays or the cart's place plays a part; and control steps.
         """
         self.simulation.set_state(start)
-        for done in range(1, task.TIME_LIMIT + 1):
+        for done in range(1, self.task.time_limit + 1):
             state = self.simulation.step(control)
             self.steps += self._cost
             if abs(state[place]) > limit:
@@ -179,7 +188,7 @@ class _Search:
                 return (0 if self._place_matters(state, control) else side), done
             if self.steps > MOST_STEPS:
                 break
-        return 0, task.TIME_LIMIT
+        return 0, self.task.time_limit
 
     def _place_matters(self, state: State, control: float) -> bool:
         there, here = self.simulation.accelerations(
@@ -192,11 +201,10 @@ class _Search:
         self.simulation.set_state(state)
         return self.simulation.step(control)
 
-
-def _has_ended(state: State) -> bool:
-    return task.has_terminated(state[0], task.max_abs(state[2::2]))
+    def _has_ended(self, state: State) -> bool:
+        return self.task.has_ended(state[0], max_abs(state[2::2]))
 
 
 def _danger(state: State) -> float:
-    """How far the pole that leans most will lean in a moment."""
-    return task.max_abs([a + 0.25 * b for a, b in zip(state[2::2], state[3::2], strict=True)])
+    """Return how far the pole that leans most will lean in a moment."""
+    return max_abs([a + 0.25 * b for a, b in zip(state[2::2], state[3::2], strict=True)])

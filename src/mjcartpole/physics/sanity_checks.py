@@ -1,13 +1,13 @@
-"""Numbers that no simulation survives are refused before anything is simulated with them."""
+"""Sanity checks: numbers that no simulation survives are refused before anything is simulated."""
 
 import functools
 import itertools
+from collections.abc import Iterator
 from typing import Any, Final, Protocol
 
 import mujoco
 import numpy as np
 
-from mjcartpole import task
 from mjcartpole.errors import ModelError
 from mjcartpole.physics.bodies import HasJoints
 
@@ -31,6 +31,10 @@ MOST_FACETS: Final = 512
 """Of a sphere or a plane, in each direction; 28 is MuJoCo's default."""
 
 
+_ASIDE: Final = 0.05
+"""Every coordinate and velocity of a state that is not at rest, SI units."""
+
+
 class HasParts(HasJoints, Protocol):
     """A compiled model whose joints and controls have been found."""
 
@@ -45,34 +49,9 @@ def check_numbers(name: str, model: mujoco.MjModel) -> None:
     Raises:
         ModelError: A number is NaN or infinite, or asks for endless work or memory.
     """
-    amounts = (
-        (
-            model.narena,
-            MOST_MEMORY,
-            "bytes of working memory",
-            "memory, njmax and nconmax of <size>",
-        ),
-        (model.nbuffer, LARGEST_MODEL, "bytes once compiled", "textures, meshes, height fields"),
-        # A map has twice as many places.
-        (model.nnames_map // 2, MOST_OBJECTS, "bodies, geoms and other parts", "counts"),
-    )
-    for amount, most, what, where in amounts:
+    for amount, most, words in _amounts(model):
         if amount > most:
-            raise ModelError(
-                f"{name} has {amount:,} {what}; no more than {most:,} are taken: look at {where}"
-            )
-    for field in ("iterations", "ls_iterations", "noslip_iterations", "ccd_iterations"):
-        if getattr(model.opt, field) > MOST_ITERATIONS:
-            raise ModelError(
-                f"{name} asks for {getattr(model.opt, field)} {field} in each step; no more than "
-                f"{MOST_ITERATIONS} are done"
-            )
-    for field in ("numslices", "numstacks", "numquads"):
-        if getattr(model.vis.quality, field) > MOST_FACETS:
-            raise ModelError(
-                f"{name} has its pictures drawn with {getattr(model.vis.quality, field)} {field}; "
-                f"no more than {MOST_FACETS} are drawn: look at <visual><quality>"
-            )
+            raise ModelError(f"{name} {words}")
     if not model.opt.timestep > 0:
         raise ModelError(f"{name} has a timestep of {model.opt.timestep:g} s; use 0.02")
     for part in ("model", "opt", "stat"):
@@ -87,6 +66,25 @@ def check_numbers(name: str, model: mujoco.MjModel) -> None:
                 )
 
 
+def _amounts(model: mujoco.MjModel) -> Iterator[tuple[int, int, str]]:
+    """Yield what a model has or asks for, the most that is taken, and what is wrong with more."""
+    sizes = "memory, njmax and nconmax of <size>"
+    for has, most, what, where in (
+        (model.narena, MOST_MEMORY, "bytes of working memory", sizes),
+        (model.nbuffer, LARGEST_MODEL, "bytes once compiled", "textures, meshes, height fields"),
+        # A map has twice as many places.
+        (model.nnames_map // 2, MOST_OBJECTS, "bodies, geoms and other parts", "counts"),
+    ):
+        yield has, most, f"has {has:,} {what}; no more than {most:,} are taken: look at {where}"
+    for field in ("iterations", "ls_iterations", "noslip_iterations", "ccd_iterations"):
+        asked, most = getattr(model.opt, field), MOST_ITERATIONS
+        yield asked, most, f"asks for {asked} {field} in each step; no more than {most} are done"
+    for field in ("numslices", "numstacks", "numquads"):
+        asked, most = getattr(model.vis.quality, field), MOST_FACETS
+        drawn = f"has its pictures drawn with {asked} {field}; no more than {most} are drawn"
+        yield asked, most, f"{drawn}: look at <visual><quality>"
+
+
 def check_motion(name: str, parts: HasParts) -> None:
     """Refuse a model whose first step already ends in nonsense.
 
@@ -98,7 +96,7 @@ def check_motion(name: str, parts: HasParts) -> None:
         ModelError: MuJoCo gives up, or an acceleration is no number.
     """
     data = mujoco.MjData(parts.model)
-    for control, start in itertools.product(parts.controls, (0.0, task.RESET_HIGH)):
+    for control, start in itertools.product(parts.controls, (0.0, _ASIDE)):
         mujoco.mj_resetData(parts.model, data)
         data.qpos[:], data.qvel[:], data.ctrl[0] = start, start, control
         try:
@@ -115,7 +113,7 @@ def check_motion(name: str, parts: HasParts) -> None:
 
 @functools.cache
 def _float_fields(part: str) -> tuple[str, ...]:
-    """Names of all numbers in a part of a model, whatever MuJoCo's version has there."""
+    """Return the names of all numbers in a part of a model, whatever this MuJoCo has there."""
     owner = _part(mujoco.MjModel.from_xml_string("<mujoco/>"), part)
     names = [name for name in dir(owner) if not name.startswith("_")]
     return tuple(name for name in names if _holds_floats(getattr(owner, name)))

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from mjcartpole import task
 from mjcartpole.errors import ConfigError, SimulationError
 from mjcartpole.integrator import Integrator, check_integrator
-from mjcartpole.physics.load import CartPole
+from mjcartpole.physics.cartpole import CartPole
 
 State = tuple[float, ...]
 """`(x, x_dot, theta, theta_dot)`: m, m/s, rad, rad/s; two more values for each further pole."""
@@ -58,14 +58,14 @@ class Simulation:
         self.step: Callable[[float], State] = make_step(self.model, self.data, cartpole)
 
     def __getstate__(self) -> tuple[CartPole, Integrator, mujoco.MjData]:
-        """What a copy needs to go on bit-equal: MuJoCo's data bring their model along."""
+        """Return what a copy needs to go on bit-equal: MuJoCo's data bring their model along."""
         return self.cartpole, self.integrator, self.data
 
     def __setstate__(self, state: tuple[CartPole, Integrator, mujoco.MjData]) -> None:
         self._take(*state)
 
     def __copy__(self) -> "Simulation":
-        """A copy in the same state that moves on its own."""
+        """Return a copy in the same state that moves on its own."""
         return copy.deepcopy(self)
 
     @property
@@ -98,13 +98,13 @@ class Simulation:
             self._qpos[joint], self._qvel[joint] = state[place], state[place + 1]
 
     def observe(self) -> npt.NDArray[np.float32]:
-        """The state as an observation, shape (size,)."""
+        """Return the state as an observation, shape (size,)."""
         return self.state.astype(np.float32)
 
     def steps(
         self, states: npt.NDArray[np.float64], controls: npt.NDArray[np.float64]
     ) -> npt.NDArray[np.float64]:
-        """One control step from each of many states.
+        """Return one control step from each of many states.
 
         Args:
             states: Shape (n, size).
@@ -122,7 +122,7 @@ class Simulation:
     def accelerations(
         self, states: npt.NDArray[np.float64], controls: npt.NDArray[np.float64]
     ) -> npt.NDArray[np.float64]:
-        """MuJoCo's accelerations in each of many states.
+        """Return MuJoCo's accelerations in each of many states.
 
         Args:
             states: Shape (n, size).
@@ -143,7 +143,7 @@ class Simulation:
 
 
 def stepping_model(model: mujoco.MjModel, integrator: Integrator) -> mujoco.MjModel:
-    """A copy of a model as it is stepped; options are no geometry, so no value becomes stale.
+    """Return a copy of a model as it is stepped; changed options leave no value stale.
 
     MuJoCo answers a NaN by silently starting over from the reference position, a pole that
     stands by magic. That is switched off, so that the NaN can be seen and reported.
@@ -166,13 +166,13 @@ def stepping_model(model: mujoco.MjModel, integrator: Integrator) -> mujoco.MjMo
 
 
 def nothing_can_touch(model: mujoco.MjModel) -> bool:
-    """Whether no two geoms of a model can ever be in contact, wherever they are."""
+    """Return whether no two geoms of a model can ever be in contact, wherever they are."""
     pairs = np.bitwise_and.outer(model.geom_contype, model.geom_conaffinity)
     return not (pairs.any() or model.npair or model.nflex)
 
 
 def _nothing_else_constrains(model: mujoco.MjModel) -> bool:
-    """Whether a model has no equality, no limit and no dry friction."""
+    """Return whether a model has no equality, no limit and no dry friction."""
     constraints = (
         model.jnt_limited,
         model.dof_frictionloss,
@@ -183,7 +183,7 @@ def _nothing_else_constrains(model: mujoco.MjModel) -> bool:
 
 
 def _floats(array: npt.NDArray[np.float64]) -> "memoryview[float]":
-    """A view of MuJoCo's array that reads and writes single floats several times faster."""
+    """Return a view of MuJoCo's array that reads and writes single floats several times faster."""
     return array.data.cast("B").cast("d")
 
 
@@ -258,7 +258,7 @@ def _state_of(
 
 
 def as_one_pole(step: Callable[[float], State]) -> Callable[[float], State]:
-    """Steps of several poles that return what the rules look at: the worst of all poles.
+    """Return steps of several poles that give what the rules look at: the worst of all.
 
     That is `(x, x_dot, theta, theta_dot)` with the largest angle and the largest angular velocity,
     without signs.

@@ -69,7 +69,7 @@ class Directions:
 
 
 def find_joints(name: str, model: mujoco.MjModel) -> tuple[int, tuple[int, ...]]:
-    """Index of the cart's joint, and of each pole's; all have one coordinate each.
+    """Return the index of the cart's joint, and of each pole's; all have one coordinate each.
 
     Raises:
         NotACartPoleError: There is another joint, or a hinge is not inside the cart.
@@ -98,7 +98,7 @@ def find_joints(name: str, model: mujoco.MjModel) -> tuple[int, tuple[int, ...]]
 
 
 def find_controls(name: str, model: mujoco.MjModel, slider: int) -> tuple[float, float]:
-    """Controls of the two actions: the ends of the actuator's range, or -1 and 1 without one.
+    """Return the controls of both actions: the ends of the motor's range, or -1 and 1.
 
     Action 1 is the one that pushes more towards positive x.
 
@@ -122,12 +122,12 @@ def find_controls(name: str, model: mujoco.MjModel, slider: int) -> tuple[float,
 
 
 def motor_of(model: mujoco.MjModel) -> int:
-    """Index of the actuator that takes the one control of a model (others may take none)."""
+    """Return index of the actuator that takes the one control of a model (others may take none)."""
     return int(np.flatnonzero(model.actuator_ctrlnum)[0])
 
 
 def push(model: mujoco.MjModel, slider: int, control: float) -> float:
-    """Force along the slider by a control, N, after the limits that clip it.
+    """Return force along the slider by a control, N, after the limits that clip it.
 
     A servo's (`is_servo`) is that at rest at x = 0.
     """
@@ -177,14 +177,14 @@ def _is_fixed_gain(model: mujoco.MjModel, motor: int) -> bool:
 
 
 def is_servo(model: mujoco.MjModel) -> bool:
-    """Whether the motor's force depends on more than its control: position or velocity."""
+    """Return whether the motor's force depends on more than its control: position or velocity."""
     motor = motor_of(model)
     biased = model.actuator_biastype[motor] != mujoco.mjtBias.mjBIAS_NONE
     return bool(biased and model.actuator_biasprm[motor, 1:3].any())
 
 
 def find_substeps(name: str, model: mujoco.MjModel) -> int:
-    """Physics steps that fill a control step of 0.02 s.
+    """Return physics steps that fill a control step of 0.02 s.
 
     Raises:
         NotACartPoleError: The timestep does not divide it, or there would be too many.
@@ -206,7 +206,7 @@ def find_substeps(name: str, model: mujoco.MjModel) -> int:
 
 
 def directions(parts: HasJoints, pole: int = 0) -> Directions:
-    """Where the cart and one pole point when all coordinates are 0."""
+    """Return where the cart and one pole point when all coordinates are 0."""
     model, slider, hinge = parts.model, parts.slider, parts.hinges[pole]
     data = mujoco.MjData(model)
     data.qpos[:] = 0.0
@@ -224,7 +224,7 @@ def directions(parts: HasJoints, pole: int = 0) -> Directions:
 
 
 def _centre(parts: HasJoints, pole: int, data: mujoco.MjData) -> Vector:
-    """A pole's centre of mass in the world, m, shape (3,)."""
+    """Return a pole's centre of mass in the world, m, shape (3,)."""
     model, bodies = parts.model, pole_bodies(parts, pole)
     if mass_of(model, bodies) > 0:
         weights = model.body_mass[bodies]
@@ -237,7 +237,7 @@ def _centre(parts: HasJoints, pole: int, data: mujoco.MjData) -> Vector:
 
 
 def _up(gravity: Vector) -> Vector:
-    """The signed world axis that is nearest to straight against gravity."""
+    """Return the signed world axis that is nearest to straight against gravity."""
     pulls = np.abs(gravity)
     axis = 2 if pulls[2] >= pulls.max() else int(pulls.argmax())
     up = np.zeros(3)
@@ -266,7 +266,7 @@ def check_directions(name: str, parts: HasJoints, pole: int = 0) -> Directions:
 
 
 def _which(parts: HasJoints, pole: int) -> str:
-    """A hinge's name in brackets where there are several."""
+    """Return a hinge's name in brackets where there are several."""
     if len(parts.hinges) == 1:
         return ""
     return f" ('{parts.model.joint(parts.hinges[pole]).name or f'number {pole + 1}'}')"
@@ -291,7 +291,7 @@ def check_independent(name: str, parts: HasJoints) -> None:
 
 
 def count_from_upright(name: str, parts: HasJoints, pole: int, upright: float) -> float:
-    """Change, in place, from where a compiled model counts the hinge's angle.
+    """Return change, in place, from where a compiled model counts the hinge's angle.
 
     It is what the attribute `ref` does in a document: the pose stays, its coordinate moves. No
     derived value of the model depends on it.
@@ -354,7 +354,7 @@ def check_limits(name: str, parts: HasJoints) -> None:
 
 
 def refusal(name: str, model: mujoco.MjModel, found: str) -> NotACartPoleError:
-    """The error that says what a model has instead of what a cart-pole needs."""
+    """Return the error that says what a model has instead of what a cart-pole needs."""
     joints = [
         f"{model.joint(index).name or 'unnamed'} ({_KIND[mujoco.mjtJoint(int(kind))]})"
         for index, kind in enumerate(model.jnt_type[:_SHOWN])

@@ -37,7 +37,7 @@ def limit(memory: int, seconds: int) -> None:
 
 
 def try_document(text: bytes, library: str, plugins: str) -> str:
-    """Why a document does not compile, or cannot be stepped in time; empty if it can.
+    """Say why a document does not compile, or cannot be stepped in time; empty if it can.
 
     The first word says which: INVALID, FATAL (MuJoCo gives up) or SLOW.
     """

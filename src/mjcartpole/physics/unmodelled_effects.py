@@ -1,22 +1,23 @@
-"""What the equations leave out: everything in a model that acts on its motion beyond them.
+"""Unmodelled effects: everything in a model that acts on its motion beyond the equations.
 
 Where nothing is left out, MuJoCo and `equations` with the model's parameters must agree.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Final
 
 import mujoco
 import numpy as np
 
 from mjcartpole.errors import ModelError
+from mjcartpole.physics import equations
 from mjcartpole.physics.bodies import moving_bodies
+from mjcartpole.physics.cartpole import CartPole, with_options
 from mjcartpole.physics.deviations import deviations
 from mjcartpole.physics.engine_check import unexplained_forces
-from mjcartpole.physics.equations import CARTPOLE_V1, Parameters
+from mjcartpole.physics.equations import Parameters
 from mjcartpole.physics.file_steps import file_step, method_of
-from mjcartpole.physics.free_region import WIDE_BOX, free_region
-from mjcartpole.physics.load import CartPole, with_options
+from mjcartpole.physics.free_region import FreeRegion, free_region, wide_box
 from mjcartpole.physics.parameters import (
     can_push,
     is_on,
@@ -26,6 +27,7 @@ from mjcartpole.physics.parameters import (
     several_poles,
 )
 from mjcartpole.physics.simulation import Simulation
+from mjcartpole.task import CARTPOLE_V1, Task
 
 Effect = tuple[str, str]
 """The kind of force by which it acts (MuJoCo's `qfrc_…`), and a phrase that names it."""
@@ -42,20 +44,24 @@ _SAME_STEP: Final = 1e-9
 """Of the values of a step, relative: more than rounding, less than another integrator's."""
 
 
-def beyond_equations(cartpole: CartPole) -> list[str]:
-    """Everything in a model that acts on its motion and is not in the equations, by name.
+def beyond_equations(cartpole: CartPole, *, task: Task = CARTPOLE_V1) -> list[str]:
+    """Name everything in a model that acts on its motion and is not in the equations.
 
     What a flag of the file switches off, or what cannot act (a tendon without stiffness, the
     reference angle of a spring without stiffness), is not listed, nor what is met only outside
     the limits that end an episode, as a joint's range and geoms that collide may be. Whether
     anything acts is seen in the engine's own forces; the names are those of the usual effects.
 
+    Args:
+        cartpole: The model.
+        task: What ends an episode.
+
     Returns:
         One phrase each; empty if the equations cover the model.
     """
     if cartpole.poles > 1:
         return [several_poles(cartpole)]
-    region = free_region(cartpole)
+    region = free_region(cartpole, task=task)
     named = [*region.blocked, *_turning_slider(cartpole)]
     effects = [*_joints(cartpole), *_actuator(cartpole), *_ties(cartpole), *_surroundings(cartpole)]
     named += [phrase for _, phrase in effects]
@@ -75,29 +81,38 @@ def beyond_equations(cartpole: CartPole) -> list[str]:
     return named + [phrase for kind, phrase in unknown.items() if kind not in known]
 
 
-def beyond_step(cartpole: CartPole, method: str = "Euler") -> list[str]:
-    """Why one step of the file's own integrator is not that of a method of the equations.
+def beyond_step(
+    cartpole: CartPole,
+    method: str = "Euler",
+    beyond: Sequence[str] | None = None,
+    *,
+    task: Task = CARTPOLE_V1,
+) -> list[str]:
+    """Say why one step of the file's own integrator is not that of a method of the equations.
 
     Args:
         cartpole: The model.
         method: One of `file_steps.METHODS`.
+        beyond: What `beyond_equations` names, where it has been asked already.
+        task: What ends an episode.
 
     Returns:
         One phrase; none where the steps are the same, as those of two methods are where little
         turns or brakes.
     """
     named = f"integrator {method_of(cartpole)} instead of {method}"
-    if cartpole.poles > 1 or beyond_equations(cartpole):
+    beyond = beyond_equations(cartpole, task=task) if beyond is None else beyond
+    if beyond:
         return [] if cartpole.integrator in {"Euler", "implicitfast", method} else [named]
     # A joint that slides steps alike; only one that grips shows it.
     if cartpole.integrator == "discrete" and cartpole.model.dof_frictionloss.any():
         return ["friction that the integrator discrete solves in its own way"]
-    return [] if _steps_as(cartpole, method) else [named]
+    return [] if _steps_as(cartpole, method, free_region(cartpole, task=task)) else [named]
 
 
-def _steps_as(cartpole: CartPole, method: str) -> bool:
-    p, rng, region = read_parameters(cartpole), np.random.default_rng(0), free_region(cartpole)
-    low, high = region.box(WIDE_BOX)
+def _steps_as(cartpole: CartPole, method: str, region: FreeRegion) -> bool:
+    p, rng = read_parameters(cartpole), np.random.default_rng(0)
+    low, high = region.box(wide_box(region.task))
     states = rng.uniform(low, high, (_STEPS, 4))
     states = states[region.holds_for_a_step(states, p)]
     actions = rng.integers(2, size=len(states))
@@ -110,7 +125,7 @@ def _steps_as(cartpole: CartPole, method: str) -> bool:
 
 
 def overridden_masses(cartpole: CartPole) -> list[str]:
-    """Masses that the document gives to geoms and that an explicit `<inertial>` overrides.
+    """Return masses that the document gives to geoms and that an explicit `<inertial>` overrides.
 
     They change nothing in the motion, whatever the person who wrote them expected.
 
@@ -133,26 +148,33 @@ def overridden_masses(cartpole: CartPole) -> list[str]:
     ]
 
 
-def differs_from(cartpole: CartPole, reference: Parameters = CARTPOLE_V1) -> list[str]:
-    """All by which a model moves differently from a reference, one phrase each."""
+def differs_from(
+    cartpole: CartPole,
+    reference: Parameters = equations.CARTPOLE_V1,
+    *,
+    task: Task = CARTPOLE_V1,
+) -> list[str]:
+    """Name all by which a model moves differently from a reference, one phrase each."""
+    beyond = beyond_equations(cartpole, task=task)
+    steps = beyond_step(cartpole, beyond=beyond, task=task)
     if cartpole.poles > 1:
-        return beyond_equations(cartpole) + beyond_step(cartpole)
+        return beyond + steps
     try:
         found = [deviation.phrase for deviation in deviations(cartpole, reference)]
     except ModelError as error:
         found = [str(error)]
-    region = free_region(cartpole)
+    region = free_region(cartpole, task=task)
     met = [] if region.covers_task or region.blocked else region.bounds
-    return [*found, *met, *beyond_equations(cartpole), *beyond_step(cartpole)]
+    return [*found, *met, *beyond, *steps]
 
 
-def idle_numbers(cartpole: CartPole) -> list[str]:
-    """Numbers in a model of one pole that no episode feels, whatever was meant by them.
+def idle_numbers(cartpole: CartPole, *, task: Task = CARTPOLE_V1) -> list[str]:
+    """Name numbers in a model of one pole that no episode feels, whatever was meant by them.
 
     Returns:
         One phrase each.
     """
-    model, bit, region = cartpole.model, mujoco.mjtDisableBit, free_region(cartpole)
+    model, bit, region = cartpole.model, mujoco.mjtDisableBit, free_region(cartpole, task=task)
     found = list(region.bounds) if region.covers_task else []
     for joint in cartpole.joints:
         name = joint_label(model, joint)
@@ -162,7 +184,7 @@ def idle_numbers(cartpole: CartPole) -> list[str]:
             found.append(f"stiffness of {name}, switched off by an option flag")
         if model.dof_frictionloss[joint] and not is_on(model, bit.mjDSBL_FRICTIONLOSS):
             found.append(f"friction loss of {name}, switched off by an option flag")
-    if cartpole.integrator != "Euler" and not beyond_step(cartpole):
+    if cartpole.integrator != "Euler" and not beyond_step(cartpole, task=task):
         found.append(f"integrator {cartpole.integrator}, whose steps are Euler's here")
     if not is_on(model, bit.mjDSBL_GRAVITY) and model.opt.gravity.any():
         found.append("gravity, switched off by an option flag")
@@ -177,7 +199,7 @@ def _turning_slider(cartpole: CartPole) -> Iterator[str]:
 
 
 def _inexact_solver(model: mujoco.MjModel) -> str:
-    """Why MuJoCo's solver does not find dry friction as the equations have it; empty if it does."""
+    """Say why MuJoCo's solver does not find the equations' dry friction; empty if it does."""
     solver = mujoco.mjtSolver(int(model.opt.solver))
     if solver != mujoco.mjtSolver.mjSOL_NEWTON:
         return f"the solver {solver.name.removeprefix('mjSOL_')}"
@@ -190,7 +212,7 @@ def _inexact_solver(model: mujoco.MjModel) -> str:
 
 
 def _joints(cartpole: CartPole) -> Iterator[Effect]:
-    """Springs, damping that is not viscous, and dry friction that is not solved exactly."""
+    """Yield springs, damping that is not viscous, and dry friction that is not solved exactly."""
     model, bit = cartpole.model, mujoco.mjtDisableBit
     solver = _inexact_solver(model)
     constrained = is_on(model, bit.mjDSBL_CONSTRAINT) and is_on(model, bit.mjDSBL_FRICTIONLOSS)
@@ -206,7 +228,7 @@ def _joints(cartpole: CartPole) -> Iterator[Effect]:
 
 
 def _actuator(cartpole: CartPole) -> Iterator[Effect]:
-    """Whatever makes the motor more than a force, or a brake in proportion to the velocity."""
+    """Yield what makes the motor more than a force, or a brake proportional to the velocity."""
     model, motor = cartpole.model, cartpole.motor
     if not can_push(cartpole):
         return
@@ -226,7 +248,7 @@ def _actuator(cartpole: CartPole) -> Iterator[Effect]:
 
 
 def _ties(cartpole: CartPole) -> Iterator[Effect]:
-    """Equality constraints, tendons, deformable things and plugins."""
+    """Yield equality constraints, tendons, deformable things and plugins."""
     model, bit = cartpole.model, mujoco.mjtDisableBit
     if is_on(model, bit.mjDSBL_EQUALITY) and is_on(model, bit.mjDSBL_CONSTRAINT):
         for index in np.flatnonzero(model.eq_active0).tolist():
@@ -244,7 +266,7 @@ def _ties(cartpole: CartPole) -> Iterator[Effect]:
 
 
 def _surroundings(cartpole: CartPole) -> Iterator[Effect]:
-    """Bodies without weight, air or water, and sleep."""
+    """Yield bodies without weight, air or water, and sleep."""
     model = cartpole.model
     weighs = model.opt.gravity.any() and is_on(model, mujoco.mjtDisableBit.mjDSBL_GRAVITY)
     for body in moving_bodies(cartpole):

@@ -30,7 +30,8 @@ from mjcartpole.media.quality import DEFAULT_QUALITY, Quality
 from mjcartpole.media.renderer import DEFAULT_HEIGHT, DEFAULT_WIDTH, Renderer, open_renderer
 from mjcartpole.media.scene import DEFAULT_CAMERA, check_picture
 from mjcartpole.media.video import DEFAULT_FPS
-from mjcartpole.physics.load import CartPole, ModelLike, load_model
+from mjcartpole.physics.cartpole import CartPole
+from mjcartpole.physics.load import ModelLike, load_model
 from mjcartpole.studies.evaluation import SEED, check_count
 from mjcartpole.task import CONTROL_STEP, N_ACTIONS
 

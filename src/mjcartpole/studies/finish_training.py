@@ -12,7 +12,7 @@ from mjcartpole.learning.engine import Engine
 from mjcartpole.learning.policy import Policy
 from mjcartpole.learning.session import Session
 from mjcartpole.learning.training import TrainResult
-from mjcartpole.physics.load import CartPole
+from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.studies.evaluation import Evaluation, evaluate
 
 

@@ -24,7 +24,8 @@ from mjcartpole.learning.engine import Engine, choose_engine
 from mjcartpole.learning.session import CHECKPOINT_EVERY, Session
 from mjcartpole.learning.training import Training, TrainResult
 from mjcartpole.physics.batch_simulation import available_cores
-from mjcartpole.physics.load import CartPole, load_model, load_named
+from mjcartpole.physics.cartpole import CartPole
+from mjcartpole.physics.load import load_model, load_named
 from mjcartpole.studies.evaluation import Evaluation
 from mjcartpole.studies.finish_training import evaluate_where_trained, finish_training
 from mjcartpole.studies.statistics import Aggregate, aggregate

@@ -23,7 +23,7 @@ from mjcartpole.learning.documents import read_config, read_values
 from mjcartpole.learning.folders import SEEDS, check_here, held_folder, locked_folder
 from mjcartpole.learning.run_model import MODEL, read_model, remove_assets, write_model
 from mjcartpole.learning.stored import Fields, read_document
-from mjcartpole.physics.load import CartPole
+from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.studies.multi_seed import ManyResult, check_seeds, seed_folder
 
 TABLE, AGGREGATE = "seeds.csv", "aggregate.json"

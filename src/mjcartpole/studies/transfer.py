@@ -13,7 +13,8 @@ from mjcartpole.envs.backend import Backend
 from mjcartpole.errors import ConfigError, MjCartPoleError
 from mjcartpole.integrator import Integrator
 from mjcartpole.learning.policy import Policy
-from mjcartpole.physics.load import CartPole, Edits, ModelLike, load_model
+from mjcartpole.physics.cartpole import CartPole
+from mjcartpole.physics.load import Edits, ModelLike, load_model
 from mjcartpole.studies.evaluation import EPISODES, SEED, Evaluation, check_count, evaluate
 from mjcartpole.studies.statistics import Interval, bootstrap_interval
 

@@ -57,13 +57,13 @@ class Element:
         return self.attributes.get("name", "")
 
     def walk(self) -> Iterator["Element"]:
-        """The element and all in it, in the order of the document."""
+        """Return the element and all in it, in the order of the document."""
         yield self
         for child in self.children:
             yield from child.walk()
 
     def find(self, tag: str) -> "list[Element]":
-        """Its children of a tag; those inside a <frame> count as its own."""
+        """Return its children of a tag; those inside a <frame> count as its own."""
         found = []
         for child in self.children:
             if child.tag == tag:
@@ -120,25 +120,19 @@ class Document:
         end = self._tag_end(parent)
         if self._bytes[end - 2 : end] == b"/>":
             self._replace(end - 2, end, f"></{parent.tag}>")
-            end, new = end - 1, f"<{tag}/>"
-            self._replace(end, end, new)
-            start = end
-        else:
-            space = self._indentation(position) if position else ""
-            self._replace(end, end, f"{space}<{tag}/>")
-            start = end + len(space)
-        path = self._path(parent)
+            end -= 1
+        space = self._indentation(position) if position else ""
+        self._replace(end, end, f"{space}<{tag}/>")
         self._parse(self.text)
-        parent = self._follow(path)
-        return next(child for child in parent.children if child.start == start)
+        return next(each for each in self._elements if each.start == end + len(space))
 
     def content(self, element: Element) -> tuple[int, int]:
-        """Where an element's content begins and ends; before the text is edited."""
+        """Return where an element's content begins and ends; before the text is edited."""
         end = self._tag_end(element)
         return (end, end) if self._bytes[end - 2 : end] == b"/>" else (end, element.closes)
 
     def span(self, element: Element) -> tuple[int, int]:
-        """Where an element begins and ends; before the text is edited."""
+        """Return where an element begins and ends; before the text is edited."""
         end = self._tag_end(element)
         if self._bytes[end - 2 : end] != b"/>":
             end = self._bytes.index(b">", element.closes) + 1
@@ -198,7 +192,7 @@ class Document:
         return self._bytes.index(b">", self._attributes_end(element)) + 1
 
     def _indentation(self, position: int) -> str:
-        """The line break and the spaces before a place; nothing if something else precedes it."""
+        """Return the line break and the spaces before a place; "" if something else is there."""
         before = self._bytes[:position].decode("utf-8")
         match = re.search(r"\r?\n[ \t]*$", before)
         return match[0] if match else ""
@@ -212,23 +206,9 @@ class Document:
                 break
             element.start += moved
 
-    def _path(self, element: Element) -> list[int]:
-        path: list[int] = []
-        while element.parent is not None:
-            siblings = element.parent.children
-            path.insert(0, next(i for i, other in enumerate(siblings) if other is element))
-            element = element.parent
-        return path
-
-    def _follow(self, path: list[int]) -> Element:
-        element = self.root
-        for index in path:
-            element = element.children[index]
-        return element
-
 
 def made_strict(text: str) -> str:
-    """The text as strict parsers take it: what matters of it stays in its place, byte by byte.
+    """Return the text as strict parsers take it: what matters stays in place, byte by byte.
 
     MuJoCo is lenient: it takes comments with "--" in them, and tags with spaces before their name.
 

@@ -34,7 +34,7 @@ _WORDS: Final = {"name", "class", "childclass", "joint", "body", "site", "materi
 
 
 def parse_edit(text: str) -> tuple[str, float | str]:
-    """An edit from the command line, such as "pole.length=1.5".
+    """Return an edit from the command line, such as "pole.length=1.5".
 
     Returns:
         Key and value: a number for an edit by meaning, text for one by element.
@@ -58,7 +58,7 @@ def parse_edit(text: str) -> tuple[str, float | str]:
 
 
 def edits_of(edits: Mapping[str, object] | Sequence[str]) -> dict[str, object]:
-    """Edits as a mapping, also where they are texts such as "pole.length=1.5".
+    """Return edits as a mapping, also where they are texts such as "pole.length=1.5".
 
     Raises:
         ConfigError: A text is no edit, or two are of the same thing.
@@ -108,7 +108,7 @@ def check_key(key: str) -> None:
 def edit_document(
     document: str, edits: Mapping[str, object], name: str = "the XML document"
 ) -> str:
-    """A document with some things changed, and everything else as it was written.
+    """Return a document with some things changed, and everything else as it was written.
 
     The order of the edits does not matter: those by meaning come first, those by element after
     them.
@@ -139,7 +139,7 @@ def edit_document(
 
 
 def describe_edits(before: str, after: str) -> list[str]:
-    """What differs between two documents of the same elements, attribute by attribute.
+    """Return what differs between two documents of the same elements, attribute by attribute.
 
     Returns:
         Lines such as 'geom:pole.size: 0.03 → 0.05'; where elements were added, one line says so.
@@ -179,7 +179,7 @@ def _check_attribute(key: str, element: Element, attribute: str) -> None:
 
 
 def _text(key: str, value: object) -> str:
-    """A value as MJCF writes it."""
+    """Return a value as MJCF writes it."""
     if isinstance(value, bool | np.bool_):
         return "true" if value else "false"
     if isinstance(value, numbers.Real):

@@ -12,7 +12,7 @@ _STEP: Final = re.compile(r"([^.:]+)([.:]?)(.*)", re.DOTALL)
 
 
 def find_element(document: Document, key: str) -> tuple[Element, str]:
-    """The element and the attribute that a key names.
+    """Return the element and the attribute that a key names.
 
     A section that is missing, such as <option>, is put into the document: elements that were found
     before are then out of date.
@@ -30,7 +30,7 @@ def find_element(document: Document, key: str) -> tuple[Element, str]:
 
 
 def label_of(element: Element) -> str:
-    """How a key names an element."""
+    """Return how a key names an element."""
     if element.name and not (element.tag == "default" and element.name == "main"):
         return f"{element.tag}:{element.name}"
     parent = element.parent
@@ -40,7 +40,7 @@ def label_of(element: Element) -> str:
 
 
 def known_attributes(element: Element) -> Sequence[str]:
-    """The attributes that MJCF has for an element where it stands, sorted."""
+    """Return the attributes that MJCF has for an element where it stands, sorted."""
     path: list[str] = []
     above = element
     while above.parent is not None:
@@ -51,7 +51,7 @@ def known_attributes(element: Element) -> Sequence[str]:
 
 
 def _step(document: Document, key: str, inside: Element | None, rest: str) -> tuple[Element, str]:
-    """One step of a path: the element that it leads to, and what remains of the path."""
+    """Take one step of a path; return the element it leads to, and what remains of the path."""
     match = _STEP.match(rest)
     if match is None:
         raise ConfigError(f"{key!r} is no name of an element and an attribute")
@@ -85,7 +85,7 @@ def _in_defaults(element: Element) -> bool:
 
 
 def _named(key: str, tag: str, found: list[Element], after: str) -> tuple[Element, str]:
-    """By name; names may hold dots, so the longest that fits is meant."""
+    """Find an element by name; names may hold dots, so the longest that fits is meant."""
     fitting = [
         element for element in found
         if element.name and (after == element.name or after.startswith(f"{element.name}."))
@@ -105,7 +105,7 @@ def _named(key: str, tag: str, found: list[Element], after: str) -> tuple[Elemen
 
 
 def _acts_as_one(inside: Element | None, tag: str) -> bool:
-    """Whether MuJoCo reads several of these as one, later attributes before earlier ones."""
+    """Return whether MuJoCo reads several of these as one, later attributes before earlier ones."""
     return inside is None and tag in schema().children and schema().children[tag].single
 
 

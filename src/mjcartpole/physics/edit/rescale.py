@@ -7,6 +7,7 @@ and MuJoCo computes again.
 import math
 from collections.abc import Sequence
 from fractions import Fraction
+from functools import cached_property
 from typing import Final
 
 import mujoco
@@ -15,10 +16,10 @@ import numpy.typing as npt
 
 from mjcartpole.errors import ConfigError
 from mjcartpole.physics.bodies import cart_bodies, mass_of, pole_bodies
+from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.edit.document import Document, Element
 from mjcartpole.physics.edit.xml_elements import Parts, numbers_of
-from mjcartpole.physics.load import CartPole
-from mjcartpole.physics.parameters import pole_of
+from mjcartpole.physics.parameters import pole_of, rotation
 
 Vector = npt.NDArray[np.float64]
 
@@ -64,7 +65,7 @@ def set_pole_mass(parts: Parts, cartpole: CartPole, mass: float, pole: int = 0) 
 
 
 def _ratio(new: float, old: float) -> float:
-    """New by old; 1 where only rounding is between them, so that an edit made twice is one."""
+    """Return new by old; 1 where only rounding is between them: an edit made twice is one."""
     return 1.0 if math.isclose(new, old, rel_tol=1e-14) else new / max(old, mujoco.mjMINVAL)
 
 
@@ -89,10 +90,7 @@ def _set_mass(
 def _scale_geoms(parts: Parts, model: mujoco.MjModel, body: int, ratio: float) -> None:
     if ratio == 1:
         return
-    spec = parts.spec()
-    effective = [geom for each in spec.bodies for geom in each.geoms]
-    for index, element in parts.geoms(model, body):
-        geom = effective[index]
+    for _, element, geom in parts.geoms(model, body):
         if math.isnan(geom.mass):
             parts.put(element, "density", [ratio * float(geom.density)])
         elif geom.mass > 0:
@@ -119,7 +117,7 @@ class _RodInertial:
 
     @classmethod
     def of(cls, parts: Parts, cartpole: CartPole, pole: int) -> "_RodInertial | None":
-        """A pole's own; None if it has none, or is no such rod."""
+        """Return a pole's own; None if it has none, or is no such rod."""
         model, hinge = cartpole.model, cartpole.hinges[pole]
         root = int(model.jnt_bodyid[hinge])
         element = parts.inertial(model, root)
@@ -152,7 +150,7 @@ class _RodInertial:
 
 
 def uniform_rod_inertia(mass: float, length: float) -> float:
-    """M L^2 / 12, kg m^2, of the numbers as they are written: 0.2 * 1.5^2 / 12 gives 0.0375.
+    """Return M L^2 / 12, kg m^2, of the numbers as they are written.
 
     Plain floats would leave noise in the last digits, in a file that people read.
     """
@@ -192,7 +190,7 @@ def set_length(parts: Parts, cartpole: CartPole, length: float, pole: int = 0) -
 
 
 def length_of(cartpole: CartPole, pole: int = 0) -> float:
-    """A pole's length, hinge to tip, m, as `set_length` has it.
+    """Return a pole's length, hinge to tip, m, as `set_length` has it.
 
     Raises:
         ConfigError: The document does not show it; the reason is said.
@@ -203,7 +201,7 @@ def length_of(cartpole: CartPole, pole: int = 0) -> float:
 def _measured(
     parts: Parts, cartpole: CartPole, pole: int
 ) -> "tuple[_RodInertial | None, _Stretch]":
-    """A pole's rod, if it is one, and a stretch that knows how long the pole is."""
+    """Return a pole's rod, if it is one, and a stretch that knows how long the pole is."""
     model, hinge = cartpole.model, cartpole.hinges[pole]
     root, com = int(model.jnt_bodyid[hinge]), pole_of(cartpole, pole).com
     rod, stretch = _RodInertial.of(parts, cartpole, pole), _Stretch(parts, model, hinge, com, root)
@@ -229,19 +227,17 @@ class _Stretch:
         axis = int(np.abs(along).argmax())
         self.axis = axis if abs(along[axis]) > 1 - 1e-15 else None
         self.along = np.eye(3)[axis] * np.sign(along[axis]) if self.axis is not None else along
-        spec = parts.spec()
-        self._effective = [geom for body in spec.bodies for geom in body.geoms]
         self.old = self.new = 1.0
 
     def value(self, old: float) -> float:
-        """A distance along the pole; its tip and its middle come out without rounding."""
+        """Return a distance along the pole; its tip and its middle come out without rounding."""
         for share in (1.0, 0.5):
             if math.isclose(abs(old), share * self.old, rel_tol=1e-12):
                 return math.copysign(share * self.new, old)
         return old * _ratio(self.new, self.old)
 
     def point(self, point: Sequence[float]) -> list[float]:
-        """A point in the frame of the pole's body."""
+        """Return a point in the frame of the pole's body."""
         arm = np.array(point) - self.foot
         if self.axis is not None:
             moved = list(point)
@@ -255,17 +251,16 @@ class _Stretch:
         ]
 
     def reach(self) -> float:
-        """How far the pole reaches from the hinge: the axes of its geoms, without round ends."""
+        """Return how far the pole reaches from the hinge: its geoms' axes, without round ends."""
         reached = [0.0]
-        for index, element in self.parts.geoms(self.model, self.root):
-            ends = self._ends(index, element)
-            reached.extend(float((np.array(end) - self.foot) @ self.along) for end in ends)
+        for index, _, geom in self._geoms:
+            reached += [float((end - self.foot) @ self.along) for end in self._ends(index, geom)]
         if max(reached) <= 0:
             raise ConfigError("pole.length cannot be set: no geom of the pole shows its length")
         return max(reached)
 
     def inertial(self, element: Element) -> None:
-        """Any mass distribution along the pole: inertia goes with the length squared."""
+        """Return any mass distribution along the pole: inertia goes with the length squared."""
         if self.axis is None or _TURNED & set(element.attributes):
             raise ConfigError(
                 "pole.length cannot be set: the pole's <inertial> is turned or beside its axis; "
@@ -279,25 +274,26 @@ class _Stretch:
 
     def geoms(self) -> None:
         """Stretch what lies along the pole, move the rest."""
-        for index, element in self.parts.geoms(self.model, self.root):
-            fromto = self._fromto(index)
+        for index, element, geom in self._geoms:
+            fromto = _fromto(geom)
             if fromto is not None:
                 ends = [*self.point(fromto[:3]), *self.point(fromto[3:])]
                 if ends != fromto:
                     self.parts.put(element, "fromto", ends)
                 continue
-            self._resize(index, element)
-            pos = [float(value) for value in self._spec(index).pos]
+            self._resize(index, element, geom)
+            pos = [float(value) for value in geom.pos]
             moved = self.point(pos)
             if moved != pos:
                 self.parts.put(element, "pos", moved)
 
-    def _resize(self, index: int, element: Element) -> None:
-        model, size = self.model, [float(value) for value in self._spec(index).size]
-        kind = int(model.geom_type[index])
-        turn = np.empty(9)
-        mujoco.mju_quat2Mat(turn, model.geom_quat[index])
-        parallel = np.abs(turn.reshape(3, 3).T @ self.along)
+    @cached_property
+    def _geoms(self) -> list[tuple[int, Element, mujoco.MjsGeom]]:
+        return self.parts.geoms(self.model, self.root)
+
+    def _resize(self, index: int, element: Element, geom: mujoco.MjsGeom) -> None:
+        kind, size = int(self.model.geom_type[index]), [float(value) for value in geom.size]
+        parallel = self._shares(index)
         side = int(parallel.argmax())
         if kind == mujoco.mjtGeom.mjGEOM_SPHERE:
             return
@@ -311,23 +307,23 @@ class _Stretch:
         else:
             raise ConfigError("pole.length cannot be set: a mesh of the pole cannot be stretched")
 
-    def _ends(self, index: int, element: Element) -> list[list[float]]:
-        fromto = self._fromto(index)
+    def _ends(self, index: int, geom: mujoco.MjsGeom) -> tuple[Vector, Vector]:
+        fromto = _fromto(geom)
         if fromto is not None:
-            return [fromto[:3], fromto[3:]]
-        model, kind = self.model, int(self.model.geom_type[index])
-        turn = np.empty(9)
-        mujoco.mju_quat2Mat(turn, model.geom_quat[index])
-        half = [0.0, 0.0, float(model.geom_size[index, 1])]
-        if kind not in _LONG:
-            half = [float(value) for value in model.geom_size[index]]
-        arm = np.abs(turn.reshape(3, 3).T @ self.along) @ np.array(half) * self.along
-        return [list(model.geom_pos[index] - arm), list(model.geom_pos[index] + arm)]
+            return np.array(fromto[:3]), np.array(fromto[3:])
+        model = self.model
+        half = model.geom_size[index]
+        if int(model.geom_type[index]) in _LONG:
+            half = np.array([0.0, 0.0, half[1]])
+        arm = self._shares(index) @ half * self.along
+        return model.geom_pos[index] - arm, model.geom_pos[index] + arm
 
-    def _fromto(self, index: int) -> list[float] | None:
-        values = [float(value) for value in self._spec(index).fromto]
-        return None if math.isnan(values[0]) else values
+    def _shares(self, index: int) -> Vector:
+        """Return how much each axis of a geom goes along the pole, shape (3,)."""
+        shares: Vector = np.abs(rotation(self.model.geom_quat[index]).T @ self.along)
+        return shares
 
-    def _spec(self, index: int) -> mujoco.MjsGeom:
-        """A geom as the document has it, defaults included."""
-        return self._effective[index]
+
+def _fromto(geom: mujoco.MjsGeom) -> list[float] | None:
+    values = [float(value) for value in geom.fromto]
+    return None if math.isnan(values[0]) else values

@@ -28,7 +28,7 @@ class Node:
     children: dict[str, "Node"] = field(default_factory=dict)
 
     def walk(self) -> "Iterator[Node]":
-        """The node and all below it, each once."""
+        """Return the node and all below it, each once."""
         yield self
         for child in self.children.values():
             if child is not self and child.tag not in _NESTING:
@@ -46,7 +46,7 @@ _ADDED: dict[str, set[str]] = {
 
 @functools.cache
 def schema() -> Node:
-    """The schema's root, the element <mujoco>; parsed from MuJoCo's own print."""
+    """Return the schema's root, the element <mujoco>; parsed from MuJoCo's own print."""
     text = str(mujoco.mj_printSchema(False, True))
     root = Node("mujoco", True, set())
     stack, node = [(-1, root)], root
@@ -81,12 +81,12 @@ def _make_recursive(root: Node) -> None:
 
 
 def tags() -> list[str]:
-    """Every tag of MJCF, sorted."""
+    """Return every tag of MJCF, sorted."""
     return sorted({node.tag for node in schema().walk()} | set(_NESTING))
 
 
 def node_at(path: Iterable[str]) -> Node | None:
-    """The node of an element by the tags from the root (which is left out) down to it."""
+    """Return the node of an element by the tags from the root (which is left out) down to it."""
     node: Node | None = schema()
     for tag in path:
         node = node.children.get(tag) if node is not None else None
@@ -94,14 +94,14 @@ def node_at(path: Iterable[str]) -> Node | None:
 
 
 def attributes_of(tag: str) -> list[str]:
-    """Every attribute that an element of a tag has somewhere in MJCF, sorted."""
+    """Return every attribute that an element of a tag has somewhere in MJCF, sorted."""
     nodes = [node for node in schema().walk() if node.tag == tag]
     nodes += [schema().children["worldbody"].children[tag]] if tag in _NESTING else []
     return sorted(set().union(*(node.attributes for node in nodes)))
 
 
 def did_you_mean(word: str, known: Iterable[str]) -> str:
-    """The nearest of some words, or all of them where none is near, for the end of a message."""
+    """Return the nearest of some words, or all where none is near, for the end of a message."""
     words = sorted(set(known))
     near = difflib.get_close_matches(word, words, n=3, cutoff=0.6)
     if near:

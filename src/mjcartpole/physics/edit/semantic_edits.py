@@ -13,11 +13,12 @@ import numpy.typing as npt
 from mjcartpole import task
 from mjcartpole.errors import ConfigError
 from mjcartpole.physics.bodies import cart_bodies, mass_of
+from mjcartpole.physics.build import build
+from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.edit.document import Document
 from mjcartpole.physics.edit.element_path import find_element
 from mjcartpole.physics.edit.rescale import set_cart_mass, set_length, set_pole_mass
 from mjcartpole.physics.edit.xml_elements import Parts, number_text
-from mjcartpole.physics.load import CartPole, load_named
 from mjcartpole.physics.parameters import forces_of, pole_of
 
 
@@ -36,7 +37,7 @@ class Meaning:
     zero: bool = True
 
     def check(self, key: str, value: object) -> float:
-        """The value as a number.
+        """Return the value as a number.
 
         Raises:
             ConfigError: It is no number, not finite, or outside physics.
@@ -83,7 +84,7 @@ _JOINT_ATTRIBUTES: Final = {
 
 
 def meaning_of(key: str) -> Meaning | None:
-    """What an edit by meaning stands for; None where a key is none.
+    """Return what an edit by meaning stands for; None where a key is none.
 
     Where there are several poles, a number says which: pole2.length, hinge1.damping.
     """
@@ -91,7 +92,7 @@ def meaning_of(key: str) -> Meaning | None:
 
 
 def names_like(key: str) -> list[str]:
-    """What can be named, with the pole's number where a key has one."""
+    """Return what can be named, with the pole's number where a key has one."""
     numbered = _NUMBERED.match(key)
     return [_with_number(name, numbered[2]) if numbered else name for name in MEANINGS]
 
@@ -112,7 +113,7 @@ def apply_meanings(document: Document, values: Mapping[str, float], name: str) -
         ConfigError: The document leaves no room for an edit; the reason is said.
         ModelError: The document is no cart-pole, or is none afterwards.
     """
-    cartpole = load_named(document.text, name)
+    cartpole = build(document.text, name, own_timestep=True)
     whole, by_pole = _sort_by_pole(values, cartpole.poles)
     _edit_options(document, cartpole.model, whole)
     parts = Parts(document)
@@ -123,7 +124,7 @@ def apply_meanings(document: Document, values: Mapping[str, float], name: str) -
         set_cart_mass(parts, cartpole, whole["cart.mass"])
     centres = [_edit_pole(document, cartpole, pole, wanted) for pole, wanted in enumerate(by_pole)]
     name += f" with {', '.join(f'{key}={value:g}' for key, value in values.items())}"
-    after = load_named(document.text, name)
+    after = build(document.text, name, own_timestep=True)
     _check_outcome(_found(after), whole)
     for pole, wanted in enumerate(by_pole):
         _check_outcome(_found_of_pole(after, pole), wanted)
@@ -133,7 +134,7 @@ def apply_meanings(document: Document, values: Mapping[str, float], name: str) -
 def _sort_by_pole(
     values: Mapping[str, float], poles: int
 ) -> tuple[dict[str, float], list[dict[str, float]]]:
-    """Edits of the whole, and those of each pole without its number.
+    """Return edits of the whole, and those of each pole without its number.
 
     Raises:
         ConfigError: It is not clear which pole, or there is no such pole.
@@ -168,7 +169,9 @@ def _edit_pole(
         longer = set_length(Parts(document), before, values["pole.length"], pole)
     if "pole.length" in values or "pole.mass" in values:
         mass = values.get("pole.mass", wanted.mass)
-        set_pole_mass(Parts(document), load_named(document.text, before.name), mass, pole)
+        set_pole_mass(
+            Parts(document), build(document.text, before.name, own_timestep=True), mass, pole
+        )
     return longer * wanted.com
 
 
@@ -205,7 +208,7 @@ def _joint_value(cartpole: CartPole, joint: int, name: str) -> float:
 
 
 def _edit_force(parts: Parts, cartpole: CartPole, force: float) -> None:
-    """Through the gear, which is what force there is per unit of control."""
+    """Set the force through the gear, which is what force there is per unit of control."""
     model, motor = cartpole.model, cartpole.motor
     left, right = forces_of(cartpole)
     fixed = model.actuator_gaintype[motor] == mujoco.mjtGain.mjGAIN_FIXED
@@ -226,7 +229,7 @@ def _edit_force(parts: Parts, cartpole: CartPole, force: float) -> None:
 
 
 def _check_centre(cartpole: CartPole, pole: int, wanted: npt.NDArray[np.float64]) -> None:
-    """All that turns on the hinge must have become longer in the same proportion."""
+    """Refuse a pole of which not all has become longer in the same proportion."""
     found = pole_of(cartpole, pole).com
     if np.abs(found - wanted).max() > 1e-9 * np.abs(wanted).max():
         raise ConfigError(
@@ -237,7 +240,7 @@ def _check_centre(cartpole: CartPole, pole: int, wanted: npt.NDArray[np.float64]
 
 
 def _found(cartpole: CartPole) -> dict[str, float]:
-    """What a model has, by the names of the edits of the whole."""
+    """Return what a model has, by the names of the edits of the whole."""
     model = cartpole.model
     return {
         "cart.mass": mass_of(model, cart_bodies(cartpole)),
@@ -261,7 +264,7 @@ def _found_of_joint(cartpole: CartPole, joint: int, part: str) -> dict[str, floa
 
 
 def _check_outcome(found: Mapping[str, float], values: Mapping[str, float]) -> None:
-    """What was asked must be what the model has, whatever else the document says."""
+    """Refuse a model that has not what was asked, whatever else the document says."""
     for key, value in values.items():
         if key in found and not math.isclose(found[key], value, rel_tol=1e-9):
             raise ConfigError(

@@ -1,4 +1,4 @@
-"""The elements of a document that stand for parts of its compiled model, and numbers in them."""
+"""XML elements of a document that stand for parts of its compiled model, and numbers in them."""
 
 import math
 from collections.abc import Sequence
@@ -11,7 +11,7 @@ from mjcartpole.physics.edit.element_path import label_of
 
 
 def number_text(value: float, written: str = "") -> str:
-    """A number as MJCF writes it, all 17 digits where needed; as it was written, if it is that."""
+    """Return a number as MJCF writes it, 17 digits where needed; as written, if it is that."""
     try:
         if written and float(written) == value:
             return written
@@ -34,7 +34,7 @@ class Parts:
         self._bodies = [each for world in worlds for each in world.walk() if each.tag == "body"]
 
     def body(self, model: mujoco.MjModel, index: int) -> Element:
-        """The element of a body.
+        """Return the element of a body.
 
         Raises:
             ConfigError: The document does not write its bodies one by one.
@@ -48,7 +48,7 @@ class Parts:
         return self._bodies[index - 1]
 
     def joint(self, model: mujoco.MjModel, index: int) -> Element:
-        """The element of a joint.
+        """Return the element of a joint.
 
         Raises:
             ConfigError: Not all joints of its body are in the document.
@@ -62,11 +62,12 @@ class Parts:
             )
         return found[index - int(model.body_jntadr[body])]
 
-    def geoms(self, model: mujoco.MjModel, body: int) -> list[tuple[int, Element]]:
-        """Index and element of each geom of a body.
+    def geoms(self, model: mujoco.MjModel, body: int) -> list[tuple[int, Element, mujoco.MjsGeom]]:
+        """Return index, element, and what it says with its defaults, of each geom of a body.
 
         Raises:
             ConfigError: Some are not written in the body.
+            ModelSyntaxError: An edit has left a number that MuJoCo does not read.
         """
         elements = self.body(model, body).find("geom")
         first = int(model.body_geomadr[body])
@@ -75,27 +76,23 @@ class Parts:
                 f"the geoms of body '{model.body(body).name}' cannot be edited by meaning: not all "
                 "of them are in the document; edit by element"
             )
-        return [(first + i, element) for i, element in enumerate(elements)]
+        whole = [geom for each in self._spec().bodies for geom in each.geoms]
+        return [(first + i, element, whole[first + i]) for i, element in enumerate(elements)]
 
     def actuator(self, index: int) -> Element:
-        """The element of an actuator, by its number in the compiled model."""
+        """Return the element of an actuator, by its number in the compiled model."""
         sections = [child for child in self.document.root.children if child.tag == "actuator"]
         return [child for section in sections for child in section.children][index]
 
     def inertial(self, model: mujoco.MjModel, body: int) -> Element | None:
-        """The <inertial> that decides a body's mass; None where geoms do."""
+        """Return the <inertial> that decides a body's mass; None where geoms do."""
         found = self.body(model, body).find("inertial")
         compilers = [each for each in self.document.root.children if each.tag == "compiler"]
         said = [each.attributes.get("inertiafromgeom", "") for each in compilers]
         from_geoms = [each for each in said if each][-1:] == ["true"]
         return found[0] if found and not from_geoms else None
 
-    def spec(self) -> mujoco.MjSpec:
-        """The document with what defaults and classes give to each element.
-
-        Raises:
-            ModelSyntaxError: An edit has left a number that MuJoCo does not read.
-        """
+    def _spec(self) -> mujoco.MjSpec:
         try:
             return mujoco.MjSpec.from_string(self.document.text)
         except ValueError as error:
@@ -118,5 +115,5 @@ class Parts:
 
 
 def numbers_of(element: Element, name: str) -> list[float]:
-    """The numbers of an attribute; three zeros where it is missing."""
+    """Return the numbers of an attribute; three zeros where it is missing."""
     return [float(token) for token in element.attributes.get(name, "0 0 0").split()]

@@ -16,11 +16,11 @@ from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.policy import Policy
 from mjcartpole.learning.training import Training
 from mjcartpole.physics.bodies import farthest_from_origin
+from mjcartpole.physics.cartpole import CartPole, with_options
 from mjcartpole.physics.deviations import Deviation, deviations
 from mjcartpole.physics.equations import CARTPOLE_V1, Parameters
 from mjcartpole.physics.file_steps import method_of
 from mjcartpole.physics.free_region import FreeRegion, free_region
-from mjcartpole.physics.load import CartPole, with_options
 from mjcartpole.physics.parameters import read_parameters
 from mjcartpole.physics.simulation import Simulation
 from mjcartpole.physics.unmodelled_effects import beyond_equations, beyond_step, idle_numbers

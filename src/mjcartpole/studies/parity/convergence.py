@@ -7,9 +7,9 @@ from scipy.integrate import solve_ivp
 
 from mjcartpole.integrator import Integrator
 from mjcartpole.physics import equations
+from mjcartpole.physics.cartpole import with_options
 from mjcartpole.physics.equations import coefficients
 from mjcartpole.physics.free_region import FreeRegion
-from mjcartpole.physics.load import with_options
 from mjcartpole.physics.simulation import Simulation
 from mjcartpole.studies.parity.case import Subject, Vector
 from mjcartpole.studies.parity.dynamics import beyond_result

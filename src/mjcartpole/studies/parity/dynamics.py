@@ -13,7 +13,7 @@ from mjcartpole.physics import equations
 from mjcartpole.physics.dry_friction import DryFriction
 from mjcartpole.physics.equations import Parameters, coefficients
 from mjcartpole.physics.file_steps import file_step
-from mjcartpole.physics.free_region import WIDE_BOX
+from mjcartpole.physics.free_region import wide_box
 from mjcartpole.studies.parity.case import Against, Batch, Subject, Vector
 from mjcartpole.studies.parity.diagnosis import Predict, likely_cause
 from mjcartpole.studies.parity.result import Figure, Result
@@ -46,7 +46,7 @@ def accelerations(subject: Subject) -> Result:
     )
     if subject.against == "itself" and subject.beyond:
         return beyond_result(2, title, reason, subject.beyond)
-    batch = subject.random_batch(2, 10_000 if subject.quick else 100_000, WIDE_BOX)
+    batch = subject.random_batch(2, 10_000 if subject.quick else 100_000, wide_box())
     found = subject.simulation("gym").accelerations(batch.states, subject.controls(batch))
     _, x_dot, theta, theta_dot = batch.states.T
 
@@ -169,7 +169,7 @@ Row = tuple[Figure, tuple[str, ...]]
 
 
 def _against_equations(subject: Subject, rung: int, integrator: Integrator) -> Row:
-    batch = subject.random_batch(rung, 10_000 if subject.quick else 100_000, WIDE_BOX)
+    batch = subject.random_batch(rung, 10_000 if subject.quick else 100_000, wide_box())
     expected = _predict(subject, batch, integrator)(subject.reference)
     return _compare(subject, integrator, "equations", batch, expected)
 
@@ -191,7 +191,7 @@ def _against_gymnasium(subject: Subject, rung: int, integrator: Integrator) -> l
     n = 2_000 if subject.quick else 20_000
     env = subject.gyms(integrator)
     batches = {
-        "CartPole-v1, random states": subject.random_batch(rung + 100, n, WIDE_BOX),
+        "CartPole-v1, random states": subject.random_batch(rung + 100, n, wide_box()),
         "CartPole-v1, random actions": _along(subject, rung, n, _random(subject.rng(rung))),
         "CartPole-v1, learned actions": _along(subject, rung, n, subject.policy),
         "CartPole-v1, adversarial actions": _along(subject, rung, n, _adversarial),
