@@ -149,6 +149,7 @@ def test_edits_good_and_broken(saves, file, watch):
     assert stderr == "no longer watching mine.xml\n"
 
 
+@pytest.mark.slow
 def test_a_file_that_is_written_in_pieces_is_one_save(file, watch):
     """Each piece is a broken file."""
     watcher = watch(episodes=20)

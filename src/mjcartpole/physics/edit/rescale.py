@@ -230,7 +230,9 @@ class _Stretch:
         self.axis = axis if abs(along[axis]) > 1 - 1e-15 else None
         self.along = np.eye(3)[axis] * np.sign(along[axis]) if self.axis is not None else along
         spec = parts.spec()
-        self._effective = [geom for body in spec.bodies for geom in body.geoms]
+        self._effective: list[mujoco.MjsGeom] = [
+            geom for body in spec.bodies for geom in body.geoms
+        ]
         self.old = self.new = 1.0
 
     def value(self, old: float) -> float:
