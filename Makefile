@@ -2,16 +2,21 @@
 
 PYTHON ?= python3
 VENV ?= .venv
+# A file of versions to keep to: make test CONSTRAINTS=constraints/ci.txt
+CONSTRAINTS ?=
 BIN = $(VENV)/bin
+INSTALL = $(BIN)/python -m pip install --quiet --disable-pip-version-check $(CONSTRAINTS:%=--constraint %)
 
-.PHONY: help train test test-all lint bench clean
+.PHONY: help train test test-all coverage lint bench constraints clean
 .DELETE_ON_ERROR:
 
 help:
 	@echo "make train     train a Q-table on MuJoCo, evaluate it, film it (ARGS=... for flags)"
 	@echo "make test      lint, types and the fast tests"
 	@echo "make test-all  the same with the slow tests"
+	@echo "make coverage  the fast tests, and which lines they do not reach"
 	@echo "make bench     how fast it is, as ratios to gymnasium and MuJoCo alone"
+	@echo "make constraints  write anew which versions CI installs"
 	@echo "make clean     remove the virtual environment and caches; runs and videos stay"
 
 train: $(VENV)/installed
@@ -23,12 +28,16 @@ test: lint
 test-all: lint
 	$(BIN)/python -m pytest -q -n auto
 
+coverage: $(VENV)/installed-dev
+	$(BIN)/python -m pytest -q -n auto -m "not slow" --cov --cov-report=term-missing:skip-covered $(ARGS)
+
 bench: $(VENV)/installed-dev
 	$(BIN)/python -m benchmarks.bench $(ARGS)
 
 lint: $(VENV)/installed-dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+	$(BIN)/codespell
 	$(BIN)/mypy
 
 $(VENV)/installed: pyproject.toml
@@ -36,12 +45,22 @@ $(VENV)/installed: pyproject.toml
 	  { echo "mjcartpole needs Python 3.11 or newer; try: make PYTHON=python3.11" >&2; exit 1; }
 	@echo "Setting up $(VENV): the first time this takes a minute or two."
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable .
+	$(INSTALL) --editable .
 	@touch $@
 
 $(VENV)/installed-dev: $(VENV)/installed
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	$(INSTALL) --editable '.[dev]'
 	@touch $@
 
+# A fresh environment, so that nothing is pinned that nobody needs.
+constraints:
+	$(PYTHON) scripts/lowest_versions.py
+	fresh=$$(mktemp -d) && trap 'rm -rf "$$fresh"' EXIT && $(PYTHON) -m venv "$$fresh" && \
+	  "$$fresh/bin/pip" install --quiet --disable-pip-version-check --editable '.[dev]' && { \
+	  echo "# The versions that CI installs, on Linux with the lowest Python that is supported."; \
+	  echo "# Made by: make constraints (pip freeze --exclude-editable in a fresh environment)"; \
+	  "$$fresh/bin/pip" freeze --exclude-editable; } > constraints/new.txt && \
+	  mv constraints/new.txt constraints/ci.txt
+
 clean:
-	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache .hypothesis .coverage

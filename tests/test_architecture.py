@@ -2,6 +2,7 @@
 
 import ast
 import graphlib
+import runpy
 import subprocess
 import sys
 from pathlib import Path
@@ -10,6 +11,7 @@ import pytest
 
 import mjcartpole
 
+ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = Path(mjcartpole.__file__).parent
 LAYERS = [
     "errors",
@@ -102,6 +104,12 @@ def test_mujoco_stays_in_its_places(path):
 
 def test_every_module_belongs_to_a_layer():
     assert {layer_of(path) for path in SOURCES} <= {*LAYERS, *TOP}
+
+
+def test_the_picture_of_the_house_is_current():
+    drawn = runpy.run_path(str(ROOT / "scripts" / "draw_house.py"))["draw"]()
+    committed = (ROOT / "docs" / "images" / "house.svg").read_text(encoding="utf-8")
+    assert drawn == committed, "run: python scripts/draw_house.py"
 
 
 def loaded_after(code):

@@ -42,14 +42,9 @@ FAST = {
         "mjcartpole model list",
         "import gymnasium",
     },
-    "docs/parity.md": {
-        "mjcartpole model edit cartpole --set pole.mass=0.1001 -o my.xml",
-    },
     "docs/performance.md": {"mjcartpole --help"},
     "docs/variants.md": {
-        "mjcartpole evaluate runs/tuned-mujoco-seed0 --set pole.mass=0.3",
         "mjcartpole evaluate runs/tuned-mujoco-seed0 --set hinge.damping=0.2",
-        "mjcartpole model show moon",
         "mjcartpole model edit cartpole --set pole.length=1.5 -o mine.xml",
         "import gymnasium",
     },

@@ -1,6 +1,7 @@
 """The shipped models: each loads, is what it says, and moves as the equations say they do."""
 
 import re
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -43,6 +44,33 @@ SAID = {
 }
 SEVERAL_POLES = {"twopoles"}
 
+INERTIA = {"body:pole/inertial.pos", "body:pole/inertial.diaginertia"}
+DIFFERS = {
+    "long": {*INERTIA, "geom:pole.fromto"},
+    "short": {*INERTIA, "geom:pole.fromto"},
+    "heavy": {"body:pole/inertial.mass", "body:pole/inertial.diaginertia", "geom:pole.size"},
+    "damped": {"joint:hinge.damping"},
+    "friction": {"joint:slider.frictionloss"},
+    "moon": {"option.gravity"},
+    "wind": {"option.gravity"},
+    "stops": {
+        "joint:slider.range",
+        "joint:slider.solreflimit",
+        "geom:stop_left.pos",
+        "geom:stop_right.pos",
+    },
+    "twopoles": {
+        "body:pole",
+        "body:long",
+        "body:short",
+        "material:violet",
+        "camera:side.pos",
+    },
+    "bob": {"body:bob"},
+}
+"""All that a file may have otherwise than the reference: an attribute, or an element (there or not)
+with all in it. Files are complete in themselves; what they share is copied, and held equal here."""
+
 gallery = pytest.mark.parametrize("name", sorted(SAID))
 single = pytest.mark.parametrize("name", sorted(set(SAID) - SEVERAL_POLES))
 
@@ -67,6 +95,58 @@ def test_each_is_what_its_edit_makes(name):
     text = edit_document(REFERENCE, {**EDITS[name], "mujoco.model": name})
     assert describe_edits(load_model(name).xml, text) == []
     assert same_model(load_model(text).model, load_model(name).model)
+
+
+def elements_of(text):
+    """Return {name: (parent's name, attributes)}, in the document's order.
+
+    An element without a name or a class is called by its parent's and its tag.
+    """
+    found = {"": ("", {})}
+
+    def visit(element, parent):
+        label = element.get("name") or element.get("class")
+        name = f"{element.tag}:{label}" if label else f"{parent}/{element.tag}".lstrip("/")
+        assert name not in found, f"two elements {name}"
+        found[name] = (parent, element.attrib)
+        for child in element:
+            visit(child, name)
+
+    for section in ElementTree.fromstring(text):
+        visit(section, "")
+    return found
+
+
+def differences(text, other):
+    """Name what two documents do not share: elements, or attributes of those in both."""
+    ours, theirs = elements_of(text), elements_of(other)
+    shared = set(ours) & set(theirs)
+    for name in {**ours, **theirs}:
+        parent, attributes = ours.get(name) or theirs[name]
+        if name in shared:
+            assert theirs[name][0] == parent, f"{name} has moved"
+            there = theirs[name][1]
+            keys = {**attributes, **there}
+            yield from (f"{name}.{key}" for key in keys if attributes.get(key) != there.get(key))
+        elif parent in shared:
+            yield name
+
+
+@gallery
+def test_all_else_is_as_in_the_reference(name):
+    assert set(differences(load_model(name).xml, REFERENCE)) == DIFFERS[name]
+    ours, theirs = (list(elements_of(text)) for text in (load_model(name).xml, REFERENCE))
+    assert [one for one in ours if one in theirs] == [one for one in theirs if one in ours]
+
+
+def test_a_change_of_the_look_is_not_forgotten():
+    changed = REFERENCE.replace('fovy="26"', 'fovy="30"', 1).replace('size="0.035"', 'size="0.04"')
+    changed = changed.replace('<material name="blue" rgba="0.16 0.42 0.74 1" specular="0.2"/>', "")
+    assert set(differences(changed, REFERENCE)) == {
+        "camera:side.fovy",
+        "default:leg/geom.size",
+        "material:blue",
+    }
 
 
 @gallery

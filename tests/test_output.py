@@ -38,7 +38,15 @@ def assert_complete(run):
 
 @on_unix
 @pytest.mark.parametrize(
-    "where", ["| head -1", "| true", ">&-", "2>&-", "<&- >&- 2>&-", "2>&1 | true"]
+    "where",
+    [
+        "| head -1",
+        "<&- >&- 2>&-",
+        *(
+            pytest.param(where, marks=pytest.mark.slow)
+            for where in ("| true", ">&-", "2>&-", "2>&1 | true")
+        ),
+    ],
 )
 def test_a_training_goes_on_when_nobody_listens(where, tmp_path):
     code, _, err = shell(f"MJ {TRAIN} {where}; exit ${{PIPESTATUS[0]}}", tmp_path)
@@ -49,7 +57,7 @@ def test_a_training_goes_on_when_nobody_listens(where, tmp_path):
 
 @on_unix
 @needs_full
-@pytest.mark.parametrize("unbuffered", ["", "1"])
+@pytest.mark.parametrize("unbuffered", ["", pytest.param("1", marks=pytest.mark.slow)])
 def test_a_full_disk_under_stdout_is_one_line_and_the_run_is_complete(unbuffered, tmp_path):
     code, _, err = shell(f"MJ {TRAIN} > /dev/full", tmp_path, PYTHONUNBUFFERED=unbuffered)
     assert (code, err.count(FULL), "Traceback" in err) == (2, 1, False)
@@ -59,7 +67,13 @@ def test_a_full_disk_under_stdout_is_one_line_and_the_run_is_complete(unbuffered
 
 
 @on_unix
-@pytest.mark.parametrize("command", ["--help", "--version", "model show moon"])
+@pytest.mark.parametrize(
+    "command",
+    [
+        "--version",
+        *(pytest.param(c, marks=pytest.mark.slow) for c in ("--help", "model show moon")),
+    ],
+)
 def test_other_commands_end_without_noise_as_well(command, tmp_path):
     for where in ("| true", ">&-", ">&- 2>&-"):
         code, _, err = shell(f"MJ {command} {where}; exit ${{PIPESTATUS[0]}}", tmp_path)
@@ -69,6 +83,7 @@ def test_other_commands_end_without_noise_as_well(command, tmp_path):
         assert (code, err.count(FULL), err.count("\n")) == (2, 1, 1)
 
 
+@pytest.mark.slow
 @on_unix
 def test_nothing_is_written_into_a_file_that_takes_a_closed_streams_place(tmp_path):
     shell(f"MJ {TRAIN} <&- >&- 2>&-", tmp_path)
@@ -80,13 +95,18 @@ def test_nothing_is_written_into_a_file_that_takes_a_closed_streams_place(tmp_pa
 @on_unix
 def test_a_watch_whose_reader_has_left_ends(tmp_path):
     (tmp_path / "mine.xml").write_text(load_model().xml)
-    code, out, err = shell("MJ watch mine.xml | head -1; exit ${PIPESTATUS[0]}", tmp_path)
+    code, out, err = shell(
+        "MJ watch mine.xml --episodes 20 --no-video | head -1; exit ${PIPESTATUS[0]}", tmp_path
+    )
     assert (code, out.count("\n"), err) == (0, 1, "")
 
 
 @on_unix
-@pytest.mark.parametrize("encoding", ["ascii", "cp1252"])
-@pytest.mark.parametrize("command", ["--help", "doctor", "parity --quick --rungs 5"])
+@pytest.mark.parametrize("encoding", ["ascii", pytest.param("cp1252", marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "command",
+    ["--help", "doctor", pytest.param("parity --quick --rungs 5", marks=pytest.mark.slow)],
+)
 def test_an_encoding_without_our_signs_is_enough(command, encoding, tmp_path):
     code, out, err = shell(f"MJ {command}", tmp_path, PYTHONIOENCODING=encoding)
     assert (code, err) == (0, "")
@@ -94,6 +114,7 @@ def test_an_encoding_without_our_signs_is_enough(command, encoding, tmp_path):
 
 
 @on_unix
+@pytest.mark.slow
 @pytest.mark.parametrize("encoding", ["ascii", "cp1252", "utf-8"])
 def test_names_that_no_encoding_has_do_not_matter(encoding, tmp_path):
     name = "né\udcff→"

@@ -199,7 +199,7 @@ def dies_at(count):
     sys.addaudithook(mortal)
 
 
-EACH = pytest.mark.parametrize("stride", [41, pytest.param(1, marks=pytest.mark.slow)])
+EACH = pytest.mark.parametrize("stride", [79, pytest.param(1, marks=pytest.mark.slow)])
 
 BEGINNINGS = {
     "one": SHORT,
@@ -1054,6 +1054,7 @@ def _dies_when_it_has_filmed():
     runs.finish_run = lambda folder: os.kill(os.getpid(), signal.SIGKILL)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name == "nt", reason="needs a terminal that a program can read")
 def test_a_terminal_is_told_of_compiling_and_of_the_speed_without_it(here):
     import pty

@@ -127,10 +127,15 @@ def test_parity_holds_for_the_reference_and_is_beyond_for_the_rest(file, capsys)
     assert "beyond the equations" in capsys.readouterr().out
 
 
-def test_ten_edits_good_and_broken(file, watch):
+SAVES = [LIGHT, BROKEN, REFERENCE, NO_CARTPOLE, LIGHT, "", "not XML", REFERENCE, LIGHT, BROKEN]
+
+
+@pytest.mark.parametrize(
+    "saves", [SAVES[:3], pytest.param(SAVES, marks=pytest.mark.slow)], ids=["three", "ten"]
+)
+def test_edits_good_and_broken(saves, file, watch):
     watcher = watch(episodes=20)
     watcher.until("done")
-    saves = [LIGHT, BROKEN, REFERENCE, NO_CARTPOLE, LIGHT, "", "not XML", REFERENCE, LIGHT, BROKEN]
     for text in saves:
         saved = time.monotonic()
         replace(file, text)
@@ -144,6 +149,7 @@ def test_ten_edits_good_and_broken(file, watch):
     assert stderr == "no longer watching mine.xml\n"
 
 
+@pytest.mark.slow
 def test_a_file_that_is_written_in_pieces_is_one_save(file, watch):
     """Each piece is a broken file."""
     watcher = watch(episodes=20)

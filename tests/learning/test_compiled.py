@@ -476,6 +476,7 @@ QUICK_TRAINING = """
 COMPILING = "mjcartpole INFO compiling the training loop"
 
 
+@pytest.mark.slow
 def test_the_first_training_says_that_it_compiles_and_the_second_process_need_not(tmp_path):
     environment = {"NUMBA_CACHE_DIR": str(tmp_path)}
     (first, said), (second, nothing) = (python(QUICK_TRAINING, **environment) for _ in range(2))

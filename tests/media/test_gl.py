@@ -216,7 +216,7 @@ FORKING = """
 @pytest.mark.parametrize(
     ("method", "when", "expected"),
     [
-        ("fork", "first", None),
+        pytest.param("fork", "first", None, marks=pytest.mark.slow),
         ("fork", "before", "sketch"),  # the driver's threads are not in the copy
         ("spawn", "before", None),
     ],
@@ -351,6 +351,7 @@ BESIDE = """
     ],
     ids=["theirs first", "ours first", "ours at exit"],
 )
+@pytest.mark.slow
 def test_mujocos_own_renderer_beside_ours(backend, close):
     done = run(BESIDE.replace("CLOSE", close), **{gl.VARIABLE: backend})
     assert (done.returncode, done.stdout.strip(), done.stderr) == (0, backend, "")

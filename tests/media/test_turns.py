@@ -93,13 +93,15 @@ def run(code, kind, argument):
     return done.returncode, done.stderr
 
 
-@pytest.mark.parametrize("end", ["closed", "left"])
+@pytest.mark.parametrize("end", ["closed", pytest.param("left", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("kind", KINDS)
 def test_threads_draw_with_one_environment_and_with_their_own(kind, end):
     assert run(TOGETHER, kind, end) == (0, "")
 
 
-@pytest.mark.parametrize("envs", ["one", "own", "new"])
+@pytest.mark.parametrize(
+    "envs", [*(pytest.param(envs, marks=pytest.mark.slow) for envs in ("one", "own")), "new"]
+)
 @pytest.mark.parametrize("kind", KINDS)
 def test_daemon_threads_that_draw_at_exit_go_in_silence(kind, envs):
     assert run(AT_EXIT, kind, envs) == (3, "")

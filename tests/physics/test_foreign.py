@@ -324,9 +324,16 @@ TOO_MUCH = {
         "moves off with an acceleration that is NaN or infinite",
     ),
 }
+OUT_OF_TIME = {"copies of copies", "simulated lengths"}
 
 
-@pytest.mark.parametrize("case", TOO_MUCH)
+@pytest.mark.parametrize(
+    "case",
+    [
+        pytest.param(case, marks=pytest.mark.slow) if case in OUT_OF_TIME else case
+        for case in TOO_MUCH
+    ],
+)
 def test_what_asks_for_too_much(case):
     text, reason = TOO_MUCH[case]
     with pytest.raises(ModelError, match=reason) as caught:

@@ -13,7 +13,14 @@ print(result.steps > 0, os.environ["MUJOCO_GL"])
 """
 
 
-@pytest.mark.parametrize("choice", ["nonsense", "disable", "egl", "osmesa", "glfw"])
+@pytest.mark.parametrize(
+    "choice",
+    [
+        "nonsense",
+        "egl",
+        *(pytest.param(choice, marks=pytest.mark.slow) for choice in ("disable", "osmesa", "glfw")),
+    ],
+)
 def test_training_works_with_any_mujoco_gl(choice):
     done = subprocess.run(
         [sys.executable, "-c", CODE],

@@ -1,6 +1,7 @@
 """The reference passes the ladder; a small error fails on the right rung for the right cause."""
 
 import dataclasses
+import functools
 import json
 import math
 import re
@@ -46,7 +47,7 @@ def failures(results):
     return {rung for rung, result in results.items() if result.verdict in {"fails", "beyond"}}
 
 
-@pytest.mark.parametrize("against", ["cartpole-v1", "itself"])
+@pytest.mark.parametrize("against", ["cartpole-v1", pytest.param("itself", marks=pytest.mark.slow)])
 def test_the_reference_passes_every_rung(against):
     subject, results = climb(REFERENCE, against, tuple(RUNGS))
     if results[10].verdict == "skipped":
@@ -137,18 +138,25 @@ WRONG = {
 }
 
 
+@functools.cache
+def steps_of_wrong(name):
+    """The subject and its results on the rungs about single steps."""
+    changes, _, _ = WRONG[name]
+    return climb(changed(*changes), rungs=(2, 3, 4))
+
+
 @pytest.mark.parametrize("name", WRONG)
 def test_a_small_error_fails_on_the_right_rung_for_the_right_cause(name):
-    changes, first_rung, cause = WRONG[name]
-    subject, results = climb(changed(*changes), rungs=(2, 3, 4))
+    _, first_rung, cause = WRONG[name]
+    subject, results = steps_of_wrong(name)
     assert min(failures(results)) == first_rung
     assert any(cause in found for found in subject.causes)
 
 
 @pytest.mark.parametrize("name", sorted(set(WRONG) - {"geom mass", "integrator"}))
 def test_a_failing_step_tells_its_story(name):
-    changes, _, cause = WRONG[name]
-    _, results = climb(changed(*changes), rungs=(3,))
+    _, _, cause = WRONG[name]
+    _, results = steps_of_wrong(name)
     worst, answers, likely = results[3].story
     assert re.match(r"worst state \(.*\), action [01]$", worst)
     assert re.match(r"MuJoCo \(.*\), equations \(.*\)$", answers)
@@ -185,7 +193,13 @@ RIGHT_WITH_OTHER_NUMBERS = {
 }
 
 
-@pytest.mark.parametrize("name", RIGHT_WITH_OTHER_NUMBERS)
+@pytest.mark.parametrize(
+    "name",
+    [
+        name if name in {"all doubled", "elsewhere"} else pytest.param(name, marks=pytest.mark.slow)
+        for name in RIGHT_WITH_OTHER_NUMBERS
+    ],
+)
 def test_motion_and_numbers_have_verdicts_of_their_own(name, tmp_path, capsys):
     changes, said = RIGHT_WITH_OTHER_NUMBERS[name]
     path = tmp_path / "model.xml"
@@ -224,7 +238,10 @@ UPS = {
 }
 
 
-@pytest.mark.parametrize("up", UPS)
+@pytest.mark.parametrize(
+    "up",
+    [up if up in {"z down", "oblique"} else pytest.param(up, marks=pytest.mark.slow) for up in UPS],
+)
 def test_whatever_is_up_moves_as_its_equations_say(up):
     gravity, rail, hinge, com = UPS[up]
     text = f"""<mujoco><option timestep="0.02" gravity="{gravity}"/><worldbody>
@@ -283,7 +300,7 @@ def rod(rng):
     )
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", [*(pytest.param(n, marks=pytest.mark.slow) for n in range(5)), 5])
 def test_random_rods_move_as_their_equations_and_gymnasiums_formula_do(seed):
     text = rod(np.random.default_rng([7, seed]))
     subject, results = climb(text, "itself", (2, 3, 4, 6, 7, 8, 9, 10))
@@ -294,7 +311,9 @@ def test_random_rods_move_as_their_equations_and_gymnasiums_formula_do(seed):
     assert failures(results) == {2, 3}
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize(
+    "seed", [0, *(pytest.param(n, marks=pytest.mark.slow) for n in range(1, 6))]
+)
 def test_random_poles_with_damping_move_as_their_equations_do(seed):
     rng = np.random.default_rng([8, seed])
     text = rod(rng)
@@ -321,7 +340,14 @@ FAR_FROM_THE_REFERENCE = [
 ]
 
 
-@pytest.mark.parametrize("edits", FAR_FROM_THE_REFERENCE, ids=",".join)
+@pytest.mark.parametrize(
+    "edits",
+    [
+        *FAR_FROM_THE_REFERENCE[:3],
+        *(pytest.param(edits, marks=pytest.mark.slow) for edits in FAR_FROM_THE_REFERENCE[3:]),
+    ],
+    ids=",".join,
+)
 def test_extreme_but_right_models_move_as_their_equations_do(edits):
     cartpole = load_model("cartpole", edits, own_timestep=True)
     results = list(run_ladder(Subject(cartpole, "itself", quick=True), (1, 2, 3, 4, 5, 9)))

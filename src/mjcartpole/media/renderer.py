@@ -195,6 +195,7 @@ class GLRenderer(TakesTurns):
         width, height = (right - left) * factor, (bottom - top) * factor
         rectangle = mujoco.MjrRect(0, 0, width, height)
         flipped = np.empty((height, width, 3), dtype=np.uint8)
+        assert self._drawing is not None  # `_render` has refused a closed one.
         self._context.make_current()
         try:
             mujoco.mjr_render(rectangle, self.scene.abstract, self._drawing)

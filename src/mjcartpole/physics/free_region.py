@@ -169,9 +169,9 @@ def _touching(cartpole: CartPole, region: FreeRegion) -> list[str]:
         for theta in angles:
             data.qpos[cartpole.slider], data.qpos[cartpole.hinges[0]] = x, theta
             mujoco.mj_fwdPosition(model, data)
-            for contact in data.contact[: data.ncon]:
-                if contact.efc_address >= 0:
-                    pairs.add((int(contact.geom[0]), int(contact.geom[1])))
+            acting = data.contact.efc_address >= 0
+            for one, other in data.contact.geom[acting].tolist():
+                pairs.add((one, other))
     return [f"contact between {_names(model, sorted(pair))}" for pair in sorted(pairs)]
 
 
