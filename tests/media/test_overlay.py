@@ -7,10 +7,11 @@ import pytest
 from PIL import Image
 
 from mjcartpole.errors import RenderError
-from mjcartpole.media.hud import ACTION, Moment, Strip
+from mjcartpole.media.hud import Moment, Strip
 from mjcartpole.media.overlay import Overlay
+from mjcartpole.media.palette import ACTION, INK, PAPER
 from mjcartpole.media.renderer import open_renderer
-from mjcartpole.media.text import INK, PAPER, Lettering
+from mjcartpole.media.text import Lettering
 from mjcartpole.physics.load import load_model, models_folder
 
 DOCUMENT = (models_folder() / "cartpole.xml").read_text(encoding="utf-8")

@@ -16,6 +16,7 @@ from mjcartpole.media.overlay import Overlay
 from mjcartpole.media.renderer import GLRenderer, open_renderer
 from mjcartpole.media.scene import Scene
 from mjcartpole.physics.load import load_model
+from mjcartpole.task import Task
 
 WIDTH, HEIGHT = 640, 480
 HALF_VIEW = 9 * math.tan(math.radians(26) / 2) * WIDTH / HEIGHT
@@ -317,6 +318,7 @@ def test_egl_osmesa_and_sketch_show_the_same(cartpole, tmp_path):
 import sys, numpy
 from mjcartpole.media.renderer import open_renderer
 from mjcartpole.physics.load import load_model
+from mjcartpole.task import Task
 kind, states, path = sys.argv[1:]
 with open_renderer(load_model(), kind=kind) as renderer:
     assert renderer.kind == kind
@@ -338,3 +340,16 @@ with open_renderer(load_model(), kind=kind) as renderer:
     for frame, state in ((f[i], s) for f in frames.values() for i, s in enumerate(states)):
         assert measured_angle(frame) == pytest.approx(state[2], abs=math.radians(1))
         assert measured_position(frame) == pytest.approx(state[0], abs=0.02 * 4.8)
+
+
+def test_the_limits_of_a_task_are_drawn(cartpole, kind):
+    def drawn(**limits):
+        task = Task("drawn", **limits)
+        with open_renderer(cartpole, width=160, height=120, kind=kind, task=task) as renderer:
+            return renderer.render(STATES[0])
+
+    with open_renderer(cartpole, width=160, height=120, kind=kind) as renderer:
+        usual = renderer.render(STATES[0])
+    assert np.array_equal(drawn(), usual)
+    assert not np.array_equal(drawn(theta_limit=0.1), usual)
+    assert not np.array_equal(drawn(theta_limit=math.inf), drawn(theta_limit=0.1))

@@ -6,10 +6,10 @@ import mujoco
 import numpy as np
 import pytest
 
-from mjcartpole import task
 from mjcartpole.errors import RenderError
 from mjcartpole.media.scene import Scene, check_picture
 from mjcartpole.physics.load import load_model, models_folder
+from mjcartpole.task import CARTPOLE_V1, Task
 
 DOCUMENT = (models_folder() / "cartpole.xml").read_text(encoding="utf-8")
 LONG = DOCUMENT.replace('fromto="0 0 0 0 0 1"', 'fromto="0 0 0 0 0 2"')
@@ -34,8 +34,8 @@ NO_GEOMS = """
 """
 
 
-def scene_of(document="cartpole", state=(0.0, 0.0, 0.0, 0.0), camera="side"):
-    scene = Scene(load_model(document), 640, 480, camera)
+def scene_of(document="cartpole", state=(0.0, 0.0, 0.0, 0.0), camera="side", task=CARTPOLE_V1):
+    scene = Scene(load_model(document), 640, 480, camera, task=task)
     scene.show(state)
     return scene
 
@@ -50,9 +50,11 @@ def angles(wedge):
 def test_the_fan_moves_with_the_cart_and_not_with_the_pole(state):
     inside, left, right = scene_of(state=state).wedges
     assert inside.corners[0] == pytest.approx([state[0], 0, 0], abs=1e-12)
-    assert angles(inside)[[0, -1]] == pytest.approx([-task.THETA_LIMIT, task.THETA_LIMIT])
-    assert angles(left)[-1] == pytest.approx(-task.THETA_LIMIT)
-    assert angles(right)[0] == pytest.approx(task.THETA_LIMIT)
+    assert angles(inside)[[0, -1]] == pytest.approx(
+        [-CARTPOLE_V1.theta_limit, CARTPOLE_V1.theta_limit]
+    )
+    assert angles(left)[-1] == pytest.approx(-CARTPOLE_V1.theta_limit)
+    assert angles(right)[0] == pytest.approx(CARTPOLE_V1.theta_limit)
 
 
 @pytest.mark.parametrize(("document", "length"), [("cartpole", 1.03), (LONG, 2.03)])
@@ -66,7 +68,26 @@ def test_the_fan_is_a_little_longer_than_the_pole(document, length):
 def test_the_fan_stands_where_the_document_has_the_pole_hang():
     inside = scene_of(HANGING, (0.0, 0.0, 0.1, 0.0)).wedges[0]
     up = np.arctan2(*(inside.corners[1:] - inside.corners[0])[:, [0, 2]].T)
-    assert sorted(up[[0, -1]]) == pytest.approx([-task.THETA_LIMIT, task.THETA_LIMIT])
+    assert sorted(up[[0, -1]]) == pytest.approx([-CARTPOLE_V1.theta_limit, CARTPOLE_V1.theta_limit])
+
+
+def test_the_fan_shows_the_limit_of_its_task():
+    inside = scene_of(task=Task("narrow", theta_limit=0.1)).wedges[0]
+    assert angles(inside)[[0, -1]] == pytest.approx([-0.1, 0.1])
+
+
+@pytest.mark.parametrize("limit", [math.pi, 4.0, math.inf])
+def test_where_any_angle_is_allowed_there_is_no_fan(limit):
+    scene = scene_of(task=Task("free", theta_limit=limit))
+    assert scene.wedges == []
+    assert scene.abstract.ngeom == scene.n_geoms
+
+
+@pytest.mark.parametrize(("limit", "extent"), [(1.0, 1.0), (2.4, 2.4), (math.inf, 2.4)])
+def test_a_free_camera_sees_the_track_of_its_task(limit, extent):
+    scene = scene_of(camera="free", task=Task("track", x_limit=limit))
+    ends = scene.view.project(np.array([[-extent, 0.0, 0.0], [extent, 0.0, 0.0]]))[0]
+    assert (ends[1] - ends[0])[0] == pytest.approx(640 / 1.2)
 
 
 def test_a_pole_without_geoms_has_no_fan():

@@ -1,9 +1,10 @@
-"""The angles within which the pole may lean, as a faint fan at its hinge.
+"""Angle limits: within which the pole may lean, as a faint fan at its hinge.
 
 It is a decoration of the picture, not of the model: any cart-pole has it, an edited one has it in
 the right place, and the physics knows nothing of it.
 """
 
+import math
 from dataclasses import dataclass
 from typing import Final
 
@@ -11,9 +12,9 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
-from mjcartpole import task
 from mjcartpole.physics.bodies import pole_bodies
 from mjcartpole.physics.cartpole import CartPole
+from mjcartpole.task import CARTPOLE_V1, Task
 
 Points = npt.NDArray[np.float64]
 
@@ -45,23 +46,18 @@ class Wedge:
 
 
 class Fan:
-    """Where the limits of one pole's angle are, for one state after the other."""
+    """Where a task's limits of one pole's angle are, for one state after the other."""
 
-    def __init__(self, cartpole: CartPole, pole: int = 0) -> None:
+    def __init__(self, cartpole: CartPole, pole: int = 0, task: Task = CARTPOLE_V1) -> None:
         model = cartpole.model
         self._joint = cartpole.hinges[pole]
         self._body = int(model.jnt_bodyid[self._joint])
         self._geoms = np.flatnonzero(np.isin(model.geom_bodyid, pole_bodies(cartpole, pole)))
         self._aabb = model.geom_aabb[self._geoms]
-        edge = task.THETA_LIMIT + _EDGE_ANGLE
-        self._spans = (
-            (_arc(-task.THETA_LIMIT, task.THETA_LIMIT), _rgba(_INSIDE)),
-            (_arc(-edge, -task.THETA_LIMIT), _rgba(_EDGE)),
-            (_arc(task.THETA_LIMIT, edge), _rgba(_EDGE)),
-        )
+        self._spans = _spans(task.theta_limit)
 
     def wedges(self, data: mujoco.MjData) -> list[Wedge]:
-        """The fan's parts; none where the pole has no length to be seen.
+        """Return the fan's parts; none where the pole has no length to be seen, or no limit.
 
         It lies in the plane in which the pole's centre of mass moves, so that perspective shows
         both alike.
@@ -71,7 +67,7 @@ class Fan:
         centre = anchor + axis * (axis @ arm)
         arm = arm - axis * (axis @ arm)
         length = float(np.linalg.norm(arm))
-        if length < 1e-6 or not len(self._geoms):
+        if length < 1e-6 or not len(self._geoms) or not self._spans:
             return []
         along = arm / length
         radius = _LENGTH * self._reach(data, centre, along)
@@ -107,6 +103,18 @@ def cross(a: Points, b: Points) -> Points:
     """The cross product of two vectors; numpy's takes ten times as long for a single one."""
     (ax, ay, az), (bx, by, bz) = a.tolist(), b.tolist()
     return np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
+
+
+def _spans(limit: float) -> list[tuple[Points, npt.NDArray[np.float32]]]:
+    """Return angles and colour of each part; none for a pole that may lean to any side."""
+    if not limit < math.pi:
+        return []
+    edge = limit + _EDGE_ANGLE
+    return [
+        (_arc(-limit, limit), _rgba(_INSIDE)),
+        (_arc(-edge, -limit), _rgba(_EDGE)),
+        (_arc(limit, edge), _rgba(_EDGE)),
+    ]
 
 
 def _arc(start: float, end: float) -> Points:

@@ -13,14 +13,9 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from mjcartpole.media.text import FAINT, INK, PAPER, Colour, Lettering, Pixels
+from mjcartpole.media.palette import ACTION, FAINT, INK, LINE, PAPER, UNCHOSEN, Colour
+from mjcartpole.media.text import Lettering, Pixels
 from mjcartpole.task import state_names
-
-ACTION: Final[Colour] = (0, 146, 118)
-"""Of the chosen action, here and at the cart: far from the colours of pole, cart and stops."""
-
-_UNCHOSEN: Final[Colour] = (200, 206, 214)
-_LINE: Final[Colour] = (205, 210, 217)
 
 _SMALLEST_FONT: Final = 10
 _FONT_PER_HEIGHT: Final = 1 / 32
@@ -132,7 +127,7 @@ class Strip:
         self._write(f"value{action}", _short(value), INK if is_chosen else FAINT)
         largest = max(abs(float(other)) for other in moment.values)
         share = abs(value) / largest if 0 < largest < math.inf else 0.0
-        bar[:, : round(share * bar.shape[1])] = ACTION if is_chosen else _UNCHOSEN
+        bar[:, : round(share * bar.shape[1])] = ACTION if is_chosen else UNCHOSEN
 
     def _write(self, name: str, text: str, colour: Colour = INK) -> None:
         if self._shown.get(name) == (text, colour):
@@ -158,7 +153,7 @@ class Strip:
             left += block_width + gap
         height = 2 * self._pad + (2 * row + 1) * self._pitch + self._text.height
         strip = np.full((height, width, 3), PAPER, np.uint8)
-        strip[: max(1, self._text.size // 12)] = _LINE
+        strip[: max(1, self._text.size // 12)] = LINE
         for block, (left, top) in zip(self._blocks, places, strict=True):
             self._place_block(strip, block, left, top)
         return strip

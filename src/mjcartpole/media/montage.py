@@ -8,9 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from mjcartpole.errors import RenderError
-from mjcartpole.media.text import FAINT, INK, PAPER, Colour, Lettering, Pixels
+from mjcartpole.media.palette import FAINT, INK, LINE, PAPER, Colour
+from mjcartpole.media.text import Lettering, Pixels
 
-_LINE: Final[Colour] = (205, 210, 217)
 _SEPARATOR: Final = 2
 """Pixels between pictures: even, so that even pictures give an even whole, as H.264 wants."""
 
@@ -161,9 +161,9 @@ class _Grid:
         size = rows * self._pitch[0] - _SEPARATOR, columns * self._pitch[1] - _SEPARATOR
         self._paper = np.full((*size, 3), PAPER, np.uint8)
         for row in range(1, rows):
-            self._paper[row * self._pitch[0] - _SEPARATOR : row * self._pitch[0]] = _LINE
+            self._paper[row * self._pitch[0] - _SEPARATOR : row * self._pitch[0]] = LINE
         for column in range(1, columns):
-            self._paper[:, column * self._pitch[1] - _SEPARATOR : column * self._pitch[1]] = _LINE
+            self._paper[:, column * self._pitch[1] - _SEPARATOR : column * self._pitch[1]] = LINE
         for index, label in enumerate(labels):
             self._write(text, index, label, height if is_below else 0, colour)
 

@@ -12,9 +12,10 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from mjcartpole.errors import RenderError
-from mjcartpole.media.hud import ACTION, Moment, Strip
+from mjcartpole.media.hud import Moment, Strip
+from mjcartpole.media.palette import ACTION, Colour
 from mjcartpole.media.scene import Box, Scene
-from mjcartpole.media.text import Colour, Pixels
+from mjcartpole.media.text import Pixels
 
 _SHORTEST_ARROW: Final = 14
 _MOST_ARROWS: Final = 100

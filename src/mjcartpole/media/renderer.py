@@ -16,6 +16,7 @@ from mjcartpole.media.scene import DEFAULT_CAMERA, Box, Scene
 from mjcartpole.media.sketch import SketchRenderer
 from mjcartpole.media.turns import TakesTurns, drawing
 from mjcartpole.physics.cartpole import CartPole
+from mjcartpole.task import CARTPOLE_V1, Task
 
 Kind = Literal["auto", "egl", "osmesa", "glfw", "sketch"]
 """Who draws: an OpenGL backend, the sketch renderer, or the best that works here."""
@@ -66,6 +67,7 @@ def open_renderer(
     camera: str = DEFAULT_CAMERA,
     quality: Quality = DEFAULT_QUALITY,
     kind: Kind = "auto",
+    task: Task = CARTPOLE_V1,
 ) -> Renderer:
     """Open a renderer for a model.
 
@@ -79,6 +81,7 @@ def open_renderer(
             multisampling, shadows and reflections, `"high"` at twice the width and height, which
             is then reduced.
         kind: `"auto"` takes OpenGL where it works and the sketch renderer where it does not.
+        task: Whose limits are shown: the fan at the hinge, and as far as a free camera sees.
 
     Raises:
         RenderError: An unknown camera, quality or kind, a size that makes no sense, or an OpenGL
@@ -87,7 +90,7 @@ def open_renderer(
     if kind not in get_args(Kind):
         raise RenderError(f"renderer {kind!r} is unknown; available: {', '.join(get_args(Kind))}")
     with drawing():
-        return _open(Scene(cartpole, width, height, camera, quality), kind)
+        return _open(Scene(cartpole, width, height, camera, quality, task), kind)
 
 
 def _open(scene: Scene, kind: Kind) -> Renderer:

@@ -14,13 +14,13 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
-from mjcartpole import task
 from mjcartpole.errors import RenderError
 from mjcartpole.media.angle_limits import Fan, Wedge, box_corners
 from mjcartpole.media.quality import DEFAULT_QUALITY, Quality, level_of
 from mjcartpole.media.view import Points, View
 from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.structure import directions
+from mjcartpole.task import CARTPOLE_V1, Task, state_names
 
 Box = tuple[int, int, int, int]
 """Left, top, right, bottom, in pixels; right and bottom lie just outside."""
@@ -63,8 +63,9 @@ class Scene:
         height: int,
         camera: str,
         quality: Quality = DEFAULT_QUALITY,
+        task: Task = CARTPOLE_V1,
     ) -> None:
-        """Prepare a scene; it is empty until the first `show`.
+        """Prepare a scene of a task; it is empty until the first `show`.
 
         Raises:
             RenderError: The size makes no sense, the model has no such camera, or there is no
@@ -77,7 +78,7 @@ class Scene:
         self.model.vis.global_.offwidth = self.width * self.level.enlargement
         self.model.vis.global_.offheight = self.height * self.level.enlargement
         self.level.prepare(self.model)
-        self._camera = _find_camera(cartpole, camera, self.width / self.height)
+        self._camera = _find_camera(cartpole, camera, self.width / self.height, task)
         self._data = mujoco.MjData(self.model)
         self._option = mujoco.MjvOption()
         self.abstract = mujoco.MjvScene(self.model, self.model.ngeom + _EXTRA_GEOMS)
@@ -87,7 +88,7 @@ class Scene:
         self.n_geoms = 0
         self.wedges: list[Wedge] = []
         self._joints = list(cartpole.joints)
-        self._fans = [Fan(cartpole, pole) for pole in range(cartpole.poles)]
+        self._fans = [Fan(cartpole, pole, task) for pole in range(cartpole.poles)]
         self._view: View | None = None
         self._moving = np.flatnonzero(~_is_fixed(self.model, self.model.geom_bodyid))
         self.is_still = _is_view_still(self.model, self._camera)
@@ -114,7 +115,7 @@ class Scene:
         Raises:
             RenderError: It is no state.
         """
-        values, names = np.asarray(state, dtype=np.float64), task.state_names(self.cartpole.poles)
+        values, names = np.asarray(state, dtype=np.float64), state_names(self.cartpole.poles)
         if values.shape != (len(names),) or not np.isfinite(values).all():
             raise RenderError(
                 f"a picture needs a state of {len(names)} finite numbers ({', '.join(names)}), "
@@ -201,7 +202,7 @@ def check_picture(cartpole: CartPole, width: int, height: int, camera: str) -> N
         RenderError: The size makes no sense, or the model has no such camera.
     """
     size = _pixels("width", width) / _pixels("height", height)
-    _find_camera(cartpole, camera, size)
+    _find_camera(cartpole, camera, size, CARTPOLE_V1)
 
 
 def _pixels(name: str, value: int) -> int:
@@ -217,7 +218,7 @@ def _pixels(name: str, value: int) -> int:
     return pixels
 
 
-def _find_camera(cartpole: CartPole, name: str, aspect: float) -> mujoco.MjvCamera:
+def _find_camera(cartpole: CartPole, name: str, aspect: float, task: Task) -> mujoco.MjvCamera:
     model = cartpole.model
     names = [model.camera(index).name for index in range(model.ncam)]
     camera = mujoco.MjvCamera()
@@ -226,14 +227,18 @@ def _find_camera(cartpole: CartPole, name: str, aspect: float) -> mujoco.MjvCame
         camera.fixedcamid = names.index(name)
         return camera
     if name in (DEFAULT_CAMERA, FREE_CAMERA):
-        _frame_track(camera, cartpole, aspect)
+        # A track without an end is seen as far as CartPole-v1's goes.
+        extent = task.x_limit if math.isfinite(task.x_limit) else CARTPOLE_V1.x_limit
+        _frame_track(camera, cartpole, aspect, extent)
         return camera
     available = ", ".join(label for label in [*names, FREE_CAMERA] if label)
     raise RenderError(f"{cartpole.name} has no camera {name!r}; available: {available}")
 
 
-def _frame_track(camera: mujoco.MjvCamera, cartpole: CartPole, aspect: float) -> None:
-    """Look from where the whole track fits into the picture, +x to the right, up to the top."""
+def _frame_track(
+    camera: mujoco.MjvCamera, cartpole: CartPole, aspect: float, extent: float
+) -> None:
+    """Look from where the track to +-extent (m) fits, +x to the right, up to the top."""
     model, towards = cartpole.model, directions(cartpole)
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
@@ -245,7 +250,7 @@ def _frame_track(camera: mujoco.MjvCamera, cartpole: CartPole, aspect: float) ->
     across = forward if abs(forward[2]) < _STRAIGHT else -np.sign(forward[2]) * up
     camera.azimuth = np.degrees(np.arctan2(across[1], across[0]))
     half_view = aspect * np.tan(np.radians(model.vis.global_.fovy) / 2)
-    camera.distance = 1.2 * task.X_LIMIT / half_view
+    camera.distance = 1.2 * extent / half_view
 
 
 def _is_fixed(model: mujoco.MjModel, bodies: npt.NDArray[np.int32]) -> npt.NDArray[np.bool_]:

@@ -6,18 +6,14 @@ every frame costs a few copies.
 
 import bisect
 import functools
-from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 from PIL import Image, ImageDraw, ImageFont
 
-Pixels = npt.NDArray[np.uint8]
-Colour = tuple[int, int, int]
+from mjcartpole.media.palette import INK, PAPER, Colour
 
-INK: Final[Colour] = (38, 44, 54)
-FAINT: Final[Colour] = (118, 126, 138)
-PAPER: Final[Colour] = (252, 252, 253)
+Pixels = npt.NDArray[np.uint8]
 
 
 class Lettering:
