@@ -76,7 +76,7 @@ EXITS = {"mjcartpole parity --model my.xml": 1}
 ENDLESS = {
     "mjcartpole watch heavy.xml": "videos/heavy.mp4",
     "mjcartpole watch mine.xml": "videos/mine.mp4",
-    "mjcartpole train --episodes 2000000 --checkpoint-every 2 --run-dir runs/long": "runs/long/checkpoint.bin",
+    "mjcartpole train --episodes 2000000 --checkpoint-every 2 --run-dir runs/long": "runs/long/checkpoint.bin",  # noqa: E501
     "mjcartpole train --resume runs/long": "goes on after",
 }
 """What a reader ends by Ctrl-C, and the file or the words that come first."""
