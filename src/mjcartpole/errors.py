@@ -21,6 +21,8 @@
 A message says what was asked, what was found, what is available and the next step, in one line.
 """
 
+from collections.abc import Iterable
+
 
 class MjCartPoleError(Exception):
     """Base of all errors of this package."""
@@ -84,3 +86,26 @@ class CheckpointError(RunError):
 
 class RenderError(MjCartPoleError):
     """A picture or a video cannot be made."""
+
+
+def check_known(
+    kind: str,
+    name: object,
+    available: Iterable[object],
+    error: type[MjCartPoleError] = ConfigError,
+) -> None:
+    """Refuse a name that is none of those there are.
+
+    >>> check_known("engine", "fast", ("compiled", "python"))
+    Traceback (most recent call last):
+    mjcartpole.errors.ConfigError: engine 'fast' is unknown; available: compiled, python
+
+    Args:
+        kind: What it names.
+        name: What was asked for.
+        available: All that may be asked for.
+        error: What is raised; a `ConfigError` unless it says otherwise.
+    """
+    names = list(available)
+    if name not in names:
+        raise error(f"{kind} {name!r} is unknown; available: {', '.join(map(str, names))}")

@@ -2,7 +2,7 @@
 
 from typing import Literal, get_args
 
-from mjcartpole.errors import ConfigError
+from mjcartpole.errors import check_known
 
 Integrator = Literal["gym", "mujoco"]
 """`gym`: explicit Euler, as CartPole-v1 does it; `mujoco`: the integrator that the file names."""
@@ -14,7 +14,4 @@ def check_integrator(integrator: str) -> None:
     Raises:
         ConfigError: See above.
     """
-    if integrator not in get_args(Integrator):
-        raise ConfigError(
-            f"integrator {integrator!r} is unknown; available: {', '.join(get_args(Integrator))}"
-        )
+    check_known("integrator", integrator, get_args(Integrator))

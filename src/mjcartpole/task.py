@@ -13,7 +13,7 @@ from typing import Any, Final, SupportsFloat, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from mjcartpole.errors import ConfigError
+from mjcartpole.errors import ConfigError, check_known
 
 CONTROL_STEP: Final = 0.02
 """Seconds between two actions."""
@@ -88,8 +88,7 @@ def task_named(name: str) -> Task:
     Raises:
         ConfigError: There is none.
     """
-    if name not in TASKS:
-        raise ConfigError(f"task {name!r} is unknown; available: {', '.join(TASKS)}")
+    check_known("task", name, TASKS)
     return TASKS[name]
 
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 import gymnasium
 
 from mjcartpole.envs.registration import ENV_ID
-from mjcartpole.errors import ConfigError
+from mjcartpole.errors import ConfigError, check_known
 from mjcartpole.integrator import Integrator, check_integrator
 from mjcartpole.task import CARTPOLE_V1, Task
 
@@ -31,10 +31,7 @@ def check_backend(
     Raises:
         ConfigError: See above.
     """
-    if backend not in get_args(Backend):
-        raise ConfigError(
-            f"backend '{backend}' is unknown; available: {', '.join(get_args(Backend))}"
-        )
+    check_known("backend", backend, get_args(Backend))
     check_integrator(integrator)
     others = (*edits, *(("own-timestep",) if own_timestep else ()))
     if backend == "gym" and ((model, integrator) != ("cartpole", "gym") or others):

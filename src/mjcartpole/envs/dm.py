@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from mjcartpole import task
-from mjcartpole.errors import ConfigError
+from mjcartpole.errors import ConfigError, check_known
 from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.load import Edits, ModelLike, load_model
 
@@ -285,8 +285,7 @@ def load(
         ConfigError: There is no such task, or a setting makes no sense.
         ModelError: The model cannot be used.
     """
-    if task_name not in TASKS:
-        raise ConfigError(f"task {task_name!r} is unknown; available: {', '.join(TASKS)}")
+    check_known("task", task_name, TASKS)
     if not time_limit > 0:
         raise ConfigError(f"time_limit must be more than 0 seconds, not {time_limit}")
     if seed is not None and seed < 0:

@@ -4,7 +4,7 @@ import dataclasses
 from collections.abc import Mapping
 from typing import Final
 
-from mjcartpole.errors import ConfigError
+from mjcartpole.errors import check_known
 from mjcartpole.integrator import Integrator, check_integrator
 from mjcartpole.physics.cartpole import INTEGRATORS, CartPole, own_copy
 from mjcartpole.physics.edit.edits import edits_of
@@ -75,10 +75,7 @@ class Editable:
 
     @kinematics.setter
     def kinematics(self, name: str) -> None:
-        if name not in list(KINEMATICS):
-            raise ConfigError(
-                f"kinematics_integrator {name!r} is unknown; available: {', '.join(KINEMATICS)}"
-            )
+        check_known("kinematics_integrator", name, KINEMATICS)
         if name != "euler" and self.own.integrator != KINEMATICS[name]:
             self.edit({"option.integrator": KINEMATICS[name]})
         self._integrator, self.is_stale = "gym" if name == "euler" else "mujoco", True

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, Self
 
 from mjcartpole.envs.backend import Backend, check_backend
-from mjcartpole.errors import ConfigError
+from mjcartpole.errors import ConfigError, check_known
 from mjcartpole.integrator import Integrator
 from mjcartpole.learning.discretizer import Discretizer
 from mjcartpole.learning.methods import method_named
@@ -176,8 +176,7 @@ class TrainConfig:
         Raises:
             ConfigError: The preset or a field is unknown, or a value makes no sense.
         """
-        if name not in PRESETS:
-            raise ConfigError(f"preset '{name}' is unknown; available: {', '.join(PRESETS)}")
+        check_known("preset", name, PRESETS)
         preset = {"method": DEFAULT_METHOD, **PRESETS[name]}
         method = changes.get("method", preset["method"])
         known = config_class(method).fields()

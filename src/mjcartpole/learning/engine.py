@@ -4,7 +4,7 @@ import logging
 from typing import TYPE_CHECKING, Literal, get_args
 
 from mjcartpole.envs.backend import Backend
-from mjcartpole.errors import ConfigError
+from mjcartpole.errors import check_known
 
 if TYPE_CHECKING:
     from mjcartpole.physics.cartpole import CartPole
@@ -22,8 +22,7 @@ def check_engine(engine: str) -> None:
     Raises:
         ConfigError: See above.
     """
-    if engine not in get_args(Engine):
-        raise ConfigError(f"engine {engine!r} is unknown; available: {', '.join(get_args(Engine))}")
+    check_known("engine", engine, get_args(Engine))
 
 
 def choose_engine(engine: str, backend: Backend, cartpole: "CartPole | None" = None) -> Engine:

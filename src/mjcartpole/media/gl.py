@@ -23,7 +23,7 @@ import weakref
 from types import ModuleType
 from typing import Final, Protocol, get_args
 
-from mjcartpole.errors import RenderError
+from mjcartpole.errors import RenderError, check_known
 from mjcartpole.media import backend_probe
 from mjcartpole.media.backend_probe import PLATFORM_VARIABLE, try_backend
 from mjcartpole.media.turns import end_drawing
@@ -220,10 +220,7 @@ def make_context(backend: Backend, width: int, height: int) -> Context:
     Raises:
         RenderError: There is no such backend, or it gives no context.
     """
-    if backend not in get_args(Backend):
-        raise RenderError(
-            f"OpenGL backend {backend!r} is unknown; available: {', '.join(get_args(Backend))}"
-        )
+    check_known("OpenGL backend", backend, get_args(Backend), RenderError)
     try:
         return Context(backend, width, height)
     except Exception as error:  # PyOpenGL and the drivers raise about everything here.

@@ -9,7 +9,7 @@ from typing import Final, Literal, get_args
 
 import mujoco
 
-from mjcartpole.errors import RenderError
+from mjcartpole.errors import RenderError, check_known
 
 Quality = Literal["draft", "normal", "high"]
 """Names of the levels, from the fastest to the finest."""
@@ -59,7 +59,5 @@ def level_of(quality: Quality) -> Level:
     Raises:
         RenderError: There is no such quality.
     """
-    if quality not in _LEVELS:
-        available = ", ".join(get_args(Quality))
-        raise RenderError(f"quality {quality!r} is unknown; available: {available}")
+    check_known("quality", quality, get_args(Quality), RenderError)
     return _LEVELS[quality]

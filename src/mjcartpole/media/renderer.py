@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 from PIL import Image
 
-from mjcartpole.errors import RenderError
+from mjcartpole.errors import RenderError, check_known
 from mjcartpole.media import gl
 from mjcartpole.media.backend_probe import Backend
 from mjcartpole.media.quality import DEFAULT_QUALITY, Quality
@@ -87,8 +87,7 @@ def open_renderer(
         RenderError: An unknown camera, quality or kind, a size that makes no sense, or an OpenGL
             backend that was asked for by name and does not work.
     """
-    if kind not in get_args(Kind):
-        raise RenderError(f"renderer {kind!r} is unknown; available: {', '.join(get_args(Kind))}")
+    check_known("renderer", kind, get_args(Kind), RenderError)
     with drawing():
         return _open(Scene(cartpole, width, height, camera, quality, task), kind)
 

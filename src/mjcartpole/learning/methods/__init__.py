@@ -10,7 +10,7 @@ from typing import Any, Final, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from mjcartpole.errors import ConfigError
+from mjcartpole.errors import check_known
 from mjcartpole.learning.methods import expected_sarsa, q_learning, sarsa
 from mjcartpole.learning.methods.experience import Trajectory, Transition
 from mjcartpole.learning.methods.parameters import Parameters
@@ -65,7 +65,6 @@ def method_named(name: str) -> Method:
     Raises:
         ConfigError: There is none.
     """
-    if name not in METHODS:
-        raise ConfigError(f"method {name!r} is unknown; available: {', '.join(METHODS)}")
+    check_known("method", name, METHODS)
     method: Method = METHODS[name]
     return method
