@@ -7,8 +7,8 @@ import mujoco
 import numpy as np
 from gymnasium.envs.mujoco import MujocoEnv
 
-from mjcartpole import task
 from mjcartpole.physics.load import find_model, load_model
+from mjcartpole.task import CARTPOLE_V1, CONTROL_STEP
 
 
 class GymnasiumMujoco(MujocoEnv):
@@ -16,7 +16,7 @@ class GymnasiumMujoco(MujocoEnv):
 
     metadata = {  # noqa: RUF012 - gymnasium's own declaration
         "render_modes": ["human", "rgb_array", "depth_array", "rgbd_tuple"],
-        "render_fps": round(1 / task.CONTROL_STEP),
+        "render_fps": round(1 / CONTROL_STEP),
     }
 
     def __init__(self) -> None:
@@ -28,12 +28,12 @@ class GymnasiumMujoco(MujocoEnv):
         """Advance 0.02 s."""
         self.do_simulation(np.array([1.0 if action == 1 else -1.0]), self.frame_skip)
         observation = self._observe()
-        over = task.has_terminated(observation[0], observation[2])
+        over = CARTPOLE_V1.has_ended(observation[0], observation[2])
         return observation, 1.0, over, False, {}
 
     def reset_model(self) -> Any:  # noqa: ANN401 - gymnasium's own signature
         """Draw a starting state."""
-        low, high = task.RESET_LOW, task.RESET_HIGH
+        low, high = CARTPOLE_V1.start_low, CARTPOLE_V1.start_high
         qpos, qvel = (self.np_random.uniform(low, high, 2) for _ in range(2))
         self.set_state(qpos, qvel)  # type: ignore[no-untyped-call]
         return self._observe()

@@ -7,8 +7,8 @@ import numpy as np
 
 # It says why, and does so before the first model is opened.
 import mjcartpole.envs.dm  # noqa: F401
-from mjcartpole import task
 from mjcartpole.physics.load import load_model
+from mjcartpole.task import CARTPOLE_V1
 
 with warnings.catch_warnings():
     # dm_control opens a window library, which complains where there is no screen.
@@ -26,7 +26,7 @@ class Balance(control.Task):  # type: ignore[misc]
 
     def initialize_episode(self, physics: Any) -> None:  # noqa: ANN401
         """Draw a starting state."""
-        low, high = task.RESET_LOW, task.RESET_HIGH
+        low, high = CARTPOLE_V1.start_low, CARTPOLE_V1.start_high
         physics.data.qpos[:] = self._random.uniform(low, high, 2)
         physics.data.qvel[:] = self._random.uniform(low, high, 2)
 
@@ -49,7 +49,7 @@ class Balance(control.Task):  # type: ignore[misc]
     def get_termination(self, physics: Any) -> float | None:  # noqa: ANN401
         """0 where the rules end the episode, else None."""
         x, theta = physics.data.qpos
-        return 0.0 if task.has_terminated(x, theta) else None
+        return 0.0 if CARTPOLE_V1.has_ended(x, theta) else None
 
 
 def dm_control_environment() -> control.Environment:

@@ -12,7 +12,6 @@ from gymnasium.utils.env_checker import check_env
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mjcartpole import task
 from mjcartpole.cli import main
 from mjcartpole.envs.cartpole import CartPoleEnv
 from mjcartpole.envs.vector import CartPoleVectorEnv
@@ -25,10 +24,11 @@ from mjcartpole.physics.simulation import Simulation
 from mjcartpole.studies.evaluation import evaluate
 from mjcartpole.studies.film import Film, PolicySetup, VideoOptions, play
 from mjcartpole.studies.transfer import transfer
+from mjcartpole.task import CARTPOLE_V1
 
 CHAIN = str(Path(__file__).parent / "models" / "chain.xml")
 BESIDE = "twopoles"
-LIMIT = task.THETA_LIMIT
+LIMIT = CARTPOLE_V1.theta_limit
 both = pytest.mark.parametrize("model", [BESIDE, CHAIN], ids=["beside", "chain"])
 integrators = pytest.mark.parametrize("integrator", ["gym", "mujoco"])
 

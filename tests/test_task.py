@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from mjcartpole import task
+from mjcartpole.task import CARTPOLE_V1
 
 UP = math.inf
 
@@ -15,29 +16,29 @@ UP = math.inf
     ("x", "theta", "over"),
     [
         (0.0, 0.0, False),
-        (task.X_LIMIT, 0.0, False),
-        (math.nextafter(task.X_LIMIT, UP), 0.0, True),
-        (-task.X_LIMIT, 0.0, False),
-        (math.nextafter(-task.X_LIMIT, -UP), 0.0, True),
-        (0.0, task.THETA_LIMIT, False),
-        (0.0, math.nextafter(task.THETA_LIMIT, UP), True),
-        (0.0, -task.THETA_LIMIT, False),
-        (0.0, math.nextafter(-task.THETA_LIMIT, -UP), True),
+        (CARTPOLE_V1.x_limit, 0.0, False),
+        (math.nextafter(CARTPOLE_V1.x_limit, UP), 0.0, True),
+        (-CARTPOLE_V1.x_limit, 0.0, False),
+        (math.nextafter(-CARTPOLE_V1.x_limit, -UP), 0.0, True),
+        (0.0, CARTPOLE_V1.theta_limit, False),
+        (0.0, math.nextafter(CARTPOLE_V1.theta_limit, UP), True),
+        (0.0, -CARTPOLE_V1.theta_limit, False),
+        (0.0, math.nextafter(-CARTPOLE_V1.theta_limit, -UP), True),
         (UP, 0.0, True),
     ],
 )
 def test_termination_is_strict(x, theta, over):
-    assert task.has_terminated(x, theta) is over
+    assert CARTPOLE_V1.has_ended(x, theta) is over
 
 
 def test_numbers_are_gymnasiums():
     env = gymnasium.make("CartPole-v1").unwrapped
     assert env.tau == task.CONTROL_STEP
-    assert env.x_threshold == task.X_LIMIT
-    assert env.theta_threshold_radians == task.THETA_LIMIT
-    np.testing.assert_array_equal(task.observation_bound(), env.observation_space.high)
+    assert env.x_threshold == CARTPOLE_V1.x_limit
+    assert env.theta_threshold_radians == CARTPOLE_V1.theta_limit
+    np.testing.assert_array_equal(CARTPOLE_V1.observation_bound(), env.observation_space.high)
     spec = gymnasium.spec("CartPole-v1")
-    assert (spec.max_episode_steps, 475.0) == (task.TIME_LIMIT, task.REWARD_THRESHOLD)
+    assert (spec.max_episode_steps, 475.0) == (CARTPOLE_V1.time_limit, CARTPOLE_V1.reward_threshold)
 
 
 @pytest.mark.parametrize(

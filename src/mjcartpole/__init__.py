@@ -14,7 +14,8 @@ libraries are imported when they are first needed.
 import importlib
 from typing import TYPE_CHECKING
 
-from mjcartpole.envs.registration import ENV_ID, register
+from mjcartpole.envs.registration import ENV_ID, register, register_task
+from mjcartpole.task import Task
 
 if TYPE_CHECKING:
     from mjcartpole.envs.cartpole import CartPoleEnv
@@ -40,11 +41,13 @@ __all__ = [
     "ManyResult",
     "Policy",
     "Simulation",
+    "Task",
     "TrainConfig",
     "TrainResult",
     "evaluate",
     "load_model",
     "model_names",
+    "register_task",
     "train",
     "train_many",
 ]

@@ -280,7 +280,16 @@ def _report_to_stderr() -> None:
 
 
 def _choice(command: Played) -> dict[str, Any]:
-    names = ("backend", "model", "integrator", "seed", "set", "own_timestep", "allow_assets")
+    names = (
+        "backend",
+        "model",
+        "integrator",
+        "seed",
+        "set",
+        "own_timestep",
+        "allow_assets",
+        "task",
+    )
     return {name: getattr(command, name) for name in names}
 
 

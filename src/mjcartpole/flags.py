@@ -66,6 +66,8 @@ class Played:
     """Seeds the starting states; the same as after training if left out."""
     allow_assets: tuple[Path, ...] = ()
     """Folders in which the meshes and textures of a run's model may lie, besides the run's own."""
+    task: str | None = None
+    """The rules: limits, starting states, reward, time limit; the run's own if left out."""
 
 
 @dataclass(frozen=True)

@@ -5,10 +5,11 @@ numbers of gymnasium's `CartPole-v1` (Barto, Sutton and Anderson, 1983,
 doi:10.1109/TSMC.1983.6313077).
 """
 
+import dataclasses
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Final, SupportsFloat, TypeAlias
+from typing import Final, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -27,6 +28,18 @@ function of numbers: the compiled engine compiles it as it is."""
 def one_per_step(x: float, x_dot: float, theta: float, theta_dot: float, terminated: bool) -> float:
     """Return 1: CartPole-v1's reward, also of the step that ends the episode."""
     return 1.0
+
+
+def minus_one_at_the_end(
+    x: float, x_dot: float, theta: float, theta_dot: float, terminated: bool
+) -> float:
+    """Return -1 for the step that ends the episode, 0 for others: Sutton and Barto's reward."""
+    return -1.0 if terminated else 0.0
+
+
+CONSTANT: Final[Mapping[Reward, float]] = {one_per_step: 1.0, minus_one_at_the_end: 0.0}
+"""Rewards that are the same number for every step that ends nothing, and that number: what need
+not be called in hot paths."""
 
 
 @dataclass(frozen=True)
@@ -57,6 +70,25 @@ class Task:
     time_limit: int = 500
     reward_threshold: float | None = None
 
+    def __post_init__(self) -> None:
+        """Refuse rules that make no sense.
+
+        Raises:
+            ConfigError: See above.
+        """
+        bounds = self.start_low, self.start_high
+        for rule, holds in {
+            "x_limit and theta_limit are more than 0, or infinite": self.x_limit > 0
+            and self.theta_limit > 0,
+            "start_low and start_high are finite, in this order": all(map(math.isfinite, bounds))
+            and bounds[0] <= bounds[1],
+            "time_limit is a whole number from 1": isinstance(self.time_limit, int)
+            and self.time_limit >= 1,
+            "reward is a function of numbers": callable(self.reward),
+        }.items():
+            if not holds:
+                raise ConfigError(f"{rule}; not so in {self}")
+
     def has_ended(self, x: float, theta: float) -> bool:
         """Return whether the cart (m) has left the track or the pole (rad) has fallen.
 
@@ -64,6 +96,19 @@ class Task:
         is the one that leans most.
         """
         return abs(x) > self.x_limit or abs(theta) > self.theta_limit
+
+    def observation_bound(self, poles: int = 1) -> npt.NDArray[np.float32]:
+        """Return the upper bound of the observation, shape (2 + 2 poles,); the lower is minus that.
+
+        Positions may be twice as large as the limits that end an episode, so that the observation
+        of the last step still lies inside; velocities are unbounded.
+        """
+        angle = [self.theta_limit * 2, np.inf]
+        return np.array([self.x_limit * 2, np.inf, *angle * poles], dtype=np.float32)
+
+    def with_sutton_barto_reward(self) -> "Task":
+        """Return the same task with 0 per step and -1 at the end."""
+        return dataclasses.replace(self, reward=minus_one_at_the_end)
 
 
 CARTPOLE_V1: Final = Task("CartPole-v1", reward_threshold=475.0)
@@ -74,8 +119,13 @@ TASKS: Final[dict[str, Task]] = {}
 
 
 def register(task: Task) -> Task:
-    """Make a task known by its name, for `TrainConfig`, the command line and gymnasium."""
-    TASKS[task.name] = task
+    """Make a task known by its name; the same once more changes nothing.
+
+    Raises:
+        ConfigError: Another one has that name.
+    """
+    if TASKS.setdefault(task.name, task) != task:
+        raise ConfigError(f"there is a task {task.name!r} already; give the new one another name")
     return task
 
 
@@ -92,73 +142,26 @@ def task_named(name: str) -> Task:
     return TASKS[name]
 
 
-X_LIMIT: Final = 2.4
-"""The cart's centre may be this far from the middle of the track, in metres."""
+def resolve(task: Task | str) -> Task:
+    """Return a task that was given itself or by its name.
 
-THETA_LIMIT: Final = 12 * 2 * math.pi / 360
-"""The pole may lean this far, in radians: 12 degrees, by gymnasium's own expression."""
+    Raises:
+        ConfigError: There is none of that name.
+    """
+    return task if isinstance(task, Task) else task_named(task)
 
-RESET_LOW: Final = -0.05
-RESET_HIGH: Final = 0.05
-"""Each of the state's values starts uniformly between these two."""
-
-TIME_LIMIT: Final = 500
-"""Control steps until an episode is truncated (the registration's business, not the env's)."""
-
-REWARD_THRESHOLD: Final = 475.0
-"""Mean return at which CartPole-v1 counts as solved."""
 
 N_ACTIONS: Final = 2
 """0 pushes to the left (-x), 1 to the right (+x)."""
 
 
-def start_bounds(options: Mapping[str, Any] | None, *others: str) -> tuple[float, float]:
-    """Bounds of the starting state's values, as `reset(options=...)` gives them.
-
-    >>> start_bounds({"low": -0.01})
-    (-0.01, 0.05)
-
-    Args:
-        options: What `reset` was given.
-        others: Options beside "low" and "high" that are read elsewhere.
-
-    Raises:
-        ConfigError: An option is unknown, a bound is no finite number, or low is above high.
-    """
-    known = ("low", "high", *others)
-    if not isinstance(options, Mapping | None):
-        raise ConfigError(f"options of reset are a dict, not {options!r}")
-    for name in options or {}:
-        if name not in known:
-            raise ConfigError(
-                f"reset has no option {name!r}; available: {', '.join(known)}. What belongs to the "
-                "model or the rules is given where the environment is made"
-            )
-    given = {"low": RESET_LOW, "high": RESET_HIGH, **(options or {})}
-    low, high = (_finite(name, given[name]) for name in ("low", "high"))
-    if low > high:
-        raise ConfigError(f"low ({low}) is above high ({high}); the starting state lies between")
-    _finite("the distance from low to high", high - low)
-    return low, high
-
-
-def _finite(name: str, value: SupportsFloat | str) -> float:
-    try:
-        number = float(value)
-    except (TypeError, ValueError, OverflowError):
-        number = math.nan
-    if not math.isfinite(number):
-        raise ConfigError(f"{name} is a finite number, not {value!r}")
-    return number
-
-
 def frame_rate(control_step: float = CONTROL_STEP) -> int:
-    """Frames per second of a film with one frame per control step of so many seconds."""
+    """Return frames per second of a film with a frame per control step of so many seconds."""
     return max(1, round(1 / control_step))
 
 
 def state_names(poles: int = 1) -> tuple[str, ...]:
-    """What the values of a state are: m, m/s, then rad and rad/s of each pole.
+    """Return what the values of a state are: m, m/s, then rad and rad/s of each pole.
 
     >>> state_names(2)
     ('x', 'x_dot', 'theta1', 'theta1_dot', 'theta2', 'theta2_dot')
@@ -169,33 +172,12 @@ def state_names(poles: int = 1) -> tuple[str, ...]:
 
 
 def in_words(poles: int) -> str:
-    """A number of poles, for messages."""
+    """Return a number of poles in words, for messages."""
     return "1 pole" if poles == 1 else f"{poles} poles"
 
 
-def observation_bound(
-    poles: int = 1, x_limit: float = X_LIMIT, theta_limit: float = THETA_LIMIT
-) -> npt.NDArray[np.float32]:
-    """Upper bound of the observation, shape (2 + 2 poles,); the lower bound is its negative.
-
-    Positions may be twice as large as the limits that end an episode, so that the observation of
-    the last step still lies inside; velocities are unbounded.
-    """
-    angle = [theta_limit * 2, np.inf]
-    return np.array([x_limit * 2, np.inf, *angle * poles], dtype=np.float32)
-
-
-def has_terminated(x: float, theta: float) -> bool:
-    """Whether the cart (m) has left the track or the pole (rad) has fallen.
-
-    The comparison is strict: a state exactly on a limit is still in play. Of several poles it is
-    the one that leans most.
-    """
-    return x < -X_LIMIT or x > X_LIMIT or theta < -THETA_LIMIT or theta > THETA_LIMIT
-
-
 def max_abs(values: Sequence[float] | npt.NDArray[np.float64]) -> float:
-    """The largest size among values; NaN if one of them is NaN or infinite."""
+    """Return the largest size among values; NaN if one of them is NaN or infinite."""
     # Comparing would lose a NaN; adding does not.
     largest, total = 0.0, 0.0
     for value in values:
@@ -204,15 +186,13 @@ def max_abs(values: Sequence[float] | npt.NDArray[np.float64]) -> float:
     return largest + 0.0 * total
 
 
-def reward(terminated: bool, already_over: bool, sutton_barto: bool) -> float:
-    """Reward of one control step.
+def worst_pole(state: Sequence[float]) -> tuple[float, float, float, float]:
+    """Return what the rules look at: the state itself, or of several poles the worst of all.
 
-    Args:
-        terminated: Whether the state after the step ends the episode.
-        already_over: Whether the episode had ended before this step.
-        sutton_barto: Use 0 per step and -1 at the end (Sutton and Barto's formulation) instead
-            of 1 per step, the last one included.
+    That is `(x, x_dot, theta, theta_dot)` with the largest angle and the largest angular velocity,
+    without signs.
     """
-    if sutton_barto:
-        return -1.0 if terminated else 0.0
-    return 0.0 if terminated and already_over else 1.0
+    if len(state) == 4:
+        x, x_dot, theta, theta_dot = state
+        return x, x_dot, theta, theta_dot
+    return state[0], state[1], max_abs(state[2::2]), max_abs(state[3::2])

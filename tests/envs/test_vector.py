@@ -18,7 +18,6 @@ from gymnasium.wrappers.vector import RecordEpisodeStatistics
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mjcartpole import task
 from mjcartpole.envs import vector
 from mjcartpole.envs.cartpole import CartPoleEnv
 from mjcartpole.envs.vector import CartPoleVectorEnv
@@ -32,6 +31,7 @@ from mjcartpole.errors import (
     SimulationError,
 )
 from mjcartpole.physics.load import load_model
+from mjcartpole.task import CARTPOLE_V1
 
 ENV_ID = "mjcartpole/CartPole-v1"
 REFERENCE = load_model("cartpole").xml
@@ -344,7 +344,7 @@ def test_a_start_beyond_the_limits_ends_with_the_step_after_it():
 @pytest.mark.parametrize("sign", [-1, 1])
 def test_limits_are_strict(place, sign):
     envs = CartPoleVectorEnv(2)
-    limit = (task.X_LIMIT, 0, task.THETA_LIMIT)[place]
+    limit = (CARTPOLE_V1.x_limit, 0, CARTPOLE_V1.theta_limit)[place]
     states = np.zeros((4, 2))
     states[place] = sign * limit, sign * np.nextafter(limit, np.inf)
     envs.state = states

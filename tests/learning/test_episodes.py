@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mjcartpole import task
 from mjcartpole.learning.episodes import ENDINGS, Columns, Episode, EpisodeLog, ending_index
+from mjcartpole.task import CARTPOLE_V1
 
 EPISODES = [
     Episode(0, 12.0, 12, "pole fell"),
@@ -29,11 +29,11 @@ def logged(episodes=EPISODES, capacity=6):
     ("terminated", "x", "ending"),
     [
         (False, 0.0, "time limit"),
-        (False, task.X_LIMIT, "time limit"),
-        (True, math.nextafter(task.X_LIMIT, 9), "off the track"),
-        (True, math.nextafter(-task.X_LIMIT, -9), "off the track"),
-        (True, task.X_LIMIT, "pole fell"),
-        (True, -task.X_LIMIT, "pole fell"),
+        (False, CARTPOLE_V1.x_limit, "time limit"),
+        (True, math.nextafter(CARTPOLE_V1.x_limit, 9), "off the track"),
+        (True, math.nextafter(-CARTPOLE_V1.x_limit, -9), "off the track"),
+        (True, CARTPOLE_V1.x_limit, "pole fell"),
+        (True, -CARTPOLE_V1.x_limit, "pole fell"),
         (True, 0.0, "pole fell"),
     ],
 )

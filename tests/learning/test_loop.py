@@ -6,13 +6,13 @@ import gymnasium
 import numpy as np
 import pytest
 
-from mjcartpole import task
 from mjcartpole.envs.backend import make_env
 from mjcartpole.errors import SimulationError
 from mjcartpole.learning.config import PRESETS, TrainConfig
 from mjcartpole.learning.discretizer import Discretizer
 from mjcartpole.learning.loop import learn_episodes, play_episode
 from mjcartpole.learning.training import Training
+from mjcartpole.task import CARTPOLE_V1
 
 
 def test_playing_records_every_state_from_first_to_last():
@@ -22,10 +22,10 @@ def test_playing_records_every_state_from_first_to_last():
     first, _ = env.reset(seed=4)
     np.testing.assert_array_equal(states[0].astype(np.float32), first)
     for state, following in pairwise(states):
-        assert not task.has_terminated(state[0], state[2])
+        assert not CARTPOLE_V1.has_ended(state[0], state[2])
         # Explicit Euler: the new position is the old one and the old velocity.
         assert following[0] == state[0] + 0.02 * state[1]
-    assert task.has_terminated(states[-1][0], states[-1][2])
+    assert CARTPOLE_V1.has_ended(states[-1][0], states[-1][2])
 
 
 def articles_code(episodes, seed, *, terminal):

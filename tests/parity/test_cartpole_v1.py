@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_match import check_environments_match
 
-from mjcartpole import task
 from mjcartpole.physics.load import load_model
+from mjcartpole.task import CARTPOLE_V1
 
 KINEMATICS = {"gym": "euler", "mujoco": "semi-implicit"}
 
@@ -107,7 +107,7 @@ def test_whole_episodes_over_the_meaningful_horizon(integrator):
 UP = math.inf
 LIMITS = [
     (place, sign * limit)
-    for place, limit in ((0, task.X_LIMIT), (2, task.THETA_LIMIT))
+    for place, limit in ((0, CARTPOLE_V1.x_limit), (2, CARTPOLE_V1.theta_limit))
     for sign in (1, -1)
 ]
 

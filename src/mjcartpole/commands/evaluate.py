@@ -19,6 +19,7 @@ from mjcartpole.studies.evaluation import Evaluation, check_count, evaluate
 from mjcartpole.studies.film import PolicySetup
 from mjcartpole.studies.multi_seed import ManyResult, SeedResult
 from mjcartpole.studies.statistics import CONFIDENCE
+from mjcartpole.task import CARTPOLE_V1, task_named
 
 RUNS = Path("runs")
 VIDEOS = Path("videos")
@@ -35,6 +36,7 @@ class EvalTarget:
     set: tuple[str, ...] = ()
     own_timestep: bool = False
     allow_assets: tuple[Path, ...] = ()
+    task: str | None = None
 
 
 def run_evaluate(source: Path, choice: EvalTarget, *, episodes: int, as_json: bool) -> int:
@@ -125,13 +127,14 @@ def set_up(source: Path, choice: EvalTarget) -> PolicySetup:
         name = _run_name(source.parent) if source.name == runs.POLICY else source.stem
         policy = Policy.load(source)
         backend, integrator, model, own_timestep = "mujoco", "gym", "cartpole", False
+        task = CARTPOLE_V1.name
         if choice.allow_assets:
             raise ConfigError("--allow-assets is for the model of a run; a policy's file has none")
     else:
         run = runs.load_run(source)
         name, policy = _run_name(run.folder), run.policy
         backend, integrator = run.config.backend, run.config.integrator
-        model, own_timestep = str(run.model), run.config.own_timestep
+        model, own_timestep, task = str(run.model), run.config.own_timestep, run.config.task
     backend = choice.backend or backend
     if backend == "gym":
         # Gymnasium's cart-pole has neither; only what the user asks for is held against that.
@@ -144,7 +147,8 @@ def set_up(source: Path, choice: EvalTarget) -> PolicySetup:
         played_on = run.cartpole(choice.allow_assets, own_timestep=own_timestep)
     if choice.set or (own_timestep and played_on == model):
         played_on = load_model(played_on, choice.set, own_timestep=own_timestep)
-    return PolicySetup(name, policy, backend, played_on, integrator, seed)
+    rules = task_named(choice.task or task)
+    return PolicySetup(name, policy, backend, played_on, integrator, seed, rules)
 
 
 def _run_name(folder: Path) -> str:
@@ -159,9 +163,15 @@ def _evaluate(setup: PolicySetup, episodes: int) -> Evaluation:
         backend=setup.backend,
         model=setup.model,
         integrator=setup.integrator,
+        task=setup.task,
         episodes=episodes,
         seed=setup.seed,
     )
+
+
+def plain(value: float) -> str:
+    """Return a return in words: whole where it is, with two digits elsewhere."""
+    return f"{value:.0f}" if value.is_integer() else f"{value:.2f}"
 
 
 def counted(count: int, what: str) -> str:
@@ -179,7 +189,7 @@ def print_evaluation(result: Evaluation, where: str = "") -> None:
     print(
         f"\ngreedy evaluation on {result.backend}{where}: "
         f"{counted(len(result.episodes), 'episode')}, seed {result.seed}\n"
-        f"  mean return {result.mean:.2f}, minimum {result.minimum:.0f}"
+        f"  mean return {result.mean:.2f}, minimum {plain(result.minimum)}"
     )
     for ending, count in result.endings.items():
         print(f"  {ending:13s} {count:5d}")
@@ -191,7 +201,7 @@ def print_seeds(many: ManyResult) -> None:
     for found in many.seeds:
         if found.evaluation is not None:
             mean, minimum = found.evaluation.mean, found.evaluation.minimum
-            print(f"{found.seed:7d} {mean:13.2f} {minimum:9.0f}")
+            print(f"{found.seed:7d} {mean:13.2f} {plain(minimum):>9s}")
         else:
             print(f"{found.seed:7d} {'failed' if found.error else 'stopped':>13s}")
     aggregate = many.aggregate()
@@ -201,6 +211,7 @@ def print_seeds(many: ManyResult) -> None:
     print(
         f"\nmean {aggregate.mean:.2f}, minimum {aggregate.minimum:.2f}\n"
         f"interquartile mean {aggregate.iqm:.2f} "
-        f"({CONFIDENCE:.0%} interval {low:.2f} to {high:.2f})\n"
-        f"solved (at least {aggregate.solved_at:g}): {aggregate.solved:.0%}"
+        f"({CONFIDENCE:.0%} interval {low:.2f} to {high:.2f})"
     )
+    if aggregate.solved_at is not None:
+        print(f"solved (at least {aggregate.solved_at:g}): {aggregate.solved:.0%}")

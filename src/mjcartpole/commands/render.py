@@ -122,6 +122,7 @@ def film_result(
         backend=config.backend,
         model=cartpole if config.backend == "mujoco" else "cartpole",
         integrator=config.integrator,
+        task=config.rules,
     )
     path = _own_film(folder, summary) or _default_path([setup], ".mp4", overwrite=False)
     # Named before it is drawn: resumed after a kill, the training takes no second name.

@@ -5,10 +5,11 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import gymnasium
 
+from mjcartpole.envs.gym_task import GymTask
 from mjcartpole.envs.registration import ENV_ID
 from mjcartpole.errors import ConfigError, check_known
 from mjcartpole.integrator import Integrator, check_integrator
-from mjcartpole.task import CARTPOLE_V1, Task
+from mjcartpole.task import CARTPOLE_V1, Task, resolve
 
 if TYPE_CHECKING:
     from mjcartpole.physics.load import ModelLike
@@ -46,18 +47,27 @@ def make_env(
     backend: Backend,
     model: "ModelLike" = "cartpole",
     integrator: Integrator = "gym",
-    task: Task = CARTPOLE_V1,
+    task: Task | str = CARTPOLE_V1,
 ) -> gymnasium.Env[Any, Any]:
-    """Make the environment of a backend, with the time limit of 500 steps.
+    """Make the environment of a backend, with the task's time limit.
 
     Gymnasium's passive checker is left out: both environments pass it in the tests, and it costs
     more than the physics.
 
     Raises:
-        ConfigError: The backend is unknown or would ignore a setting.
+        ConfigError: The backend or the task is unknown, or the backend would ignore a setting.
         ModelError: The model cannot be used.
     """
     check_backend(backend, model, integrator)
+    rules = resolve(task)
     if backend == "gym":
-        return gymnasium.make(GYM_ID, disable_env_checker=True)
-    return gymnasium.make(ENV_ID, disable_env_checker=True, model=model, integrator=integrator)
+        env = gymnasium.make(GYM_ID, max_episode_steps=rules.time_limit, disable_env_checker=True)
+        return env if rules is CARTPOLE_V1 else GymTask(env, rules)
+    return gymnasium.make(
+        ENV_ID,
+        max_episode_steps=rules.time_limit,
+        disable_env_checker=True,
+        model=model,
+        integrator=integrator,
+        task=rules,
+    )

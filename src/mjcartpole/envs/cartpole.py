@@ -10,10 +10,9 @@ import numpy.typing as npt
 from gymnasium import logger, spaces
 from gymnasium.envs.registration import EnvSpec
 
-from mjcartpole import task
 from mjcartpole.envs.editable import Editable
 from mjcartpole.envs.names import CartPoleNames, refuse_slip
-from mjcartpole.envs.options import USUAL, reset_options
+from mjcartpole.envs.options import reset_options, usual
 from mjcartpole.envs.pictures import Pictures, RenderMode, warn_without_mode
 from mjcartpole.envs.spec import portable
 from mjcartpole.errors import InvalidActionError, ResetNeededError
@@ -23,6 +22,7 @@ from mjcartpole.media.scene import DEFAULT_CAMERA
 from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.load import Edits, ModelLike, load_shared
 from mjcartpole.physics.simulation import FARTHEST_SANE, Simulation, State, as_one_pole, check_sane
+from mjcartpole.task import CARTPOLE_V1, CONSTANT, N_ACTIONS, Task, frame_rate, resolve
 
 # What `step` needs, as plain globals: the fewest look-ups and no sign to change.
 _INT64 = np.int64
@@ -120,6 +120,7 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int], CartPo
     | `edits`               | dict                   | None        | Edits of the model, such as `{"pole.length": 1.5}` |
     | `own_timestep`        | bool                   | False       | One physics step of the file per action, instead of 0.02 s |
     | `integrator`          | "gym" or "mujoco"      | "gym"       | Explicit Euler as CartPole-v1, or the integrator that the file names |
+    | `task`                | str, Task              | "CartPole-v1" | Other rules: limits, starting states, rewards; see `mjcartpole.Task` |
     | `sutton_barto_reward` | bool                   | False       | See Rewards                   |
     | `render_mode`         | None, "rgb_array", "human" | None    | Nothing, arrays, or a window (where there is a screen) |
     | `width`, `height`     | int                    | 640, 480    | Size of a picture, in pixels  |
@@ -146,7 +147,7 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int], CartPo
 
     metadata: dict[str, Any] = {  # noqa: RUF012 - gymnasium's own declaration
         "render_modes": ["human", "rgb_array"],
-        "render_fps": task.frame_rate(),
+        "render_fps": frame_rate(),
     }
 
     def __init__(
@@ -156,6 +157,7 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int], CartPo
         edits: Edits = None,
         own_timestep: bool = False,
         integrator: Integrator = "gym",
+        task: Task | str = CARTPOLE_V1,
         sutton_barto_reward: bool = False,
         render_mode: RenderMode | None = None,
         width: int = DEFAULT_WIDTH,
@@ -166,21 +168,20 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int], CartPo
 
         Raises:
             ModelError: The model cannot be found, has an error, or is no cart-pole.
-            ConfigError: The integrator or the render mode is unknown, or a window is to have a
-                size.
+            ConfigError: The integrator, the task or the render mode is unknown, or a window is to
+                have a size.
             RenderError: The size of a picture makes no sense, or the model has no such camera.
         """
         cartpole = load_shared(model, edits, own_timestep=own_timestep)
         self._model = Editable(cartpole, integrator)
         # Made when it is first needed: it takes several times as long as all the rest.
         self._simulation: Simulation | None = None
-        self._set_limits(task.X_LIMIT, task.THETA_LIMIT)
-        self.action_space = spaces.Discrete(task.N_ACTIONS)
+        rules = resolve(task)
+        self._task = rules.with_sutton_barto_reward() if sutton_barto_reward else rules
+        self._usual = usual(self._task)
+        self._set_limits(self._task.x_limit, self._task.theta_limit)
+        self.action_space = spaces.Discrete(N_ACTIONS)
         self.render_mode = render_mode
-        self._step_reward, self._end_reward, self._late_reward = (
-            task.reward(terminated=over, already_over=late, sutton_barto=sutton_barto_reward)
-            for over, late in ((False, False), (True, False), (True, True))
-        )
         self._pictures = Pictures(cartpole, render_mode, width, height, camera)
         self._advance: Callable[[float], State] = _needs_reset
         self._steps_after_end: list[int | None] = [None]
@@ -188,7 +189,7 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int], CartPo
         self._set_frame_rate(cartpole)
 
     def _set_frame_rate(self, cartpole: CartPole) -> None:
-        self.metadata = self.metadata | {"render_fps": task.frame_rate(cartpole.control_step)}
+        self.metadata = self.metadata | {"render_fps": frame_rate(cartpole.control_step)}
 
     @property
     def simulation(self) -> Simulation:
@@ -221,7 +222,7 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int], CartPo
         # A view that takes single floats several times faster than the array does.
         cells: memoryview[float] = observation.data.cast("B").cast("f")
         observe = observation.copy if poles == 1 else simulation.observe
-        self._at_hand = (*self._limits, cells, observe, self._step_reward)
+        self._at_hand = (*self._limits, cells, observe, CONSTANT.get(self._task.reward))
 
     def _set_limits(self, x: float, theta: float) -> None:
         super()._set_limits(x, theta)
@@ -307,7 +308,9 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int], CartPo
         ):
             terminated = False
         else:
-            terminated, reward = True, self._end()
+            terminated, reward = True, self._end((x, x_dot, theta, theta_dot))
+        if reward is None:
+            reward = self._task.reward(x, x_dot, theta, theta_dot, False)
         # None is told apart sooner than a word is.
         if self.render_mode is not None and self.render_mode == "human":
             self.render()
@@ -317,17 +320,18 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int], CartPo
         cells[3] = theta_dot
         return observe(), reward, terminated, False, {}
 
-    def _end(self) -> float:
-        """Reward of a step that ends the episode, or comes after its end."""
+    def _end(self, state: tuple[float, float, float, float]) -> float:
+        """Return the reward of a step that ends the episode, or comes after its end."""
         check_sane(tuple(self.simulation.state.tolist()), self.simulation.cartpole.name)
         count = self._steps_after_end
         if count[0] is None:
             count[0] = 0
-            return self._end_reward
+            return self._task.reward(*state, True)
         if count[0] == 0:
             logger.warn(_STEP_AFTER_END)
         count[0] += 1
-        return self._late_reward
+        # Nothing is earned after the end.
+        return min(0.0, self._task.reward(*state, True))
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -344,7 +348,8 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int], CartPo
                 or an edit makes no sense; nothing has changed then.
             ModelError: The edits make the model one that cannot be used.
         """
-        low, high, edits = USUAL if options is None else reset_options(options)
+        usual = self._usual
+        low, high, edits = usual if options is None else reset_options(options, usual)
         simulation = self._simulation
         if simulation is None or self._model.is_stale or edits:
             simulation = self._begin(edits)

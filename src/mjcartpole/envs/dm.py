@@ -13,10 +13,17 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from mjcartpole import task
 from mjcartpole.errors import ConfigError, check_known
 from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.load import Edits, ModelLike, load_model
+from mjcartpole.task import (
+    CARTPOLE_V1,
+    CONTROL_STEP,
+    N_ACTIONS,
+    TASKS,
+    Task,
+    worst_pole,
+)
 
 try:
     with warnings.catch_warnings():
@@ -36,8 +43,10 @@ except Exception as error:
         "on Python 3.11 and 3.12, and fits MuJoCo below 4"
     ) from error
 
-TASKS: Final = ("balance",)
-TIME_LIMIT: Final = task.TIME_LIMIT * task.CONTROL_STEP
+BALANCE: Final = "balance"
+"""What dm_control's suite calls the task that is CartPole-v1."""
+
+TIME_LIMIT: Final = CARTPOLE_V1.time_limit * CONTROL_STEP
 """Seconds."""
 
 HIGHLIGHT: Final = (0.0, 0.5, 0.3)
@@ -150,6 +159,7 @@ class Balance(control.Task):  # type: ignore[misc]
         random: np.random.RandomState | int | None,
         limit: float,
         discrete: bool,
+        rules: Task = CARTPOLE_V1,
     ) -> None:
         """Take what decides an episode.
 
@@ -158,6 +168,7 @@ class Balance(control.Task):  # type: ignore[misc]
             random: Draws the starting states; or a seed, or None to draw one.
             limit: Control steps until an episode is cut off.
             discrete: Whether actions are 0 and 1, instead of controls.
+            rules: Limits, starting states and rewards.
         """
         # Programs made for dm_control's suite put another one in its place, under this name.
         self._random = (
@@ -166,6 +177,7 @@ class Balance(control.Task):  # type: ignore[misc]
         self.steps = 0
         self._controls = cartpole.controls
         self._limit = limit
+        self._rules = rules
         self._discrete = discrete
         self._visualize_reward = False
 
@@ -187,7 +199,7 @@ class Balance(control.Task):  # type: ignore[misc]
 
     def initialize_episode(self, physics: Physics) -> None:
         """Draw a starting state."""
-        low, high = task.RESET_LOW, task.RESET_HIGH
+        low, high = self._rules.start_low, self._rules.start_high
         size = 2 * len(physics.cartpole.joints)
         physics.set_state(self.random.uniform(low=low, high=high, size=size))
         self._show_reward(physics)
@@ -196,7 +208,7 @@ class Balance(control.Task):  # type: ignore[misc]
     def action_spec(self, physics: Physics) -> specs.BoundedArray:
         """What actions look like."""
         if self._discrete:
-            return specs.DiscreteArray(task.N_ACTIONS, dtype=np.int64, name="action")
+            return specs.DiscreteArray(N_ACTIONS, dtype=np.int64, name="action")
         low, high = sorted(self._controls)
         return specs.BoundedArray((1,), np.float64, [low], [high], name="action")
 
@@ -221,15 +233,18 @@ class Balance(control.Task):  # type: ignore[misc]
         return collections.OrderedDict(position=state[0::2], velocity=state[1::2])
 
     def get_reward(self, physics: Physics) -> float:
-        """1 for every step."""
-        return 1.0
+        """Return the task's reward: of CartPole-v1, 1 for every step."""
+        state = worst_pole(physics.state.tolist())
+        return self._rules.reward(*state, self._has_ended(state))
 
     def get_termination(self, physics: Physics) -> float | None:
-        """Discount of the step that ends an episode; None while it goes on."""
-        farthest = float(np.abs(physics.pole_angles()).max())
-        if task.has_terminated(physics.cart_position(), farthest):
+        """Return the discount of the step that ends an episode; None while it goes on."""
+        if self._has_ended(worst_pole(physics.state.tolist())):
             return 0.0
         return 1.0 if self.steps >= self._limit else None
+
+    def _has_ended(self, state: tuple[float, float, float, float]) -> bool:
+        return self._rules.has_ended(state[0], state[2])
 
     def _show_reward(self, physics: Physics) -> None:
         if self._visualize_reward:
@@ -255,7 +270,7 @@ def load(
     own_timestep: bool = False,
     seed: int | None = None,
     discrete: bool = False,
-    time_limit: float = TIME_LIMIT,
+    time_limit: float | None = None,
     environment_kwargs: dict[str, Any] | None = None,
     visualize_reward: bool = False,
 ) -> control.Environment:
@@ -271,13 +286,14 @@ def load(
     1.0
 
     Args:
-        task_name: `balance`.
+        task_name: `balance`, which is CartPole-v1, or the name of another task.
         model: See `load_model`.
         edits: Changes of it; see `load_model`.
         own_timestep: See `load_model`.
         seed: Seeds the starting states; None draws one.
         discrete: Take CartPole-v1's actions 0 and 1 instead of a control between their two.
-        time_limit: Seconds until an episode is cut off; `float("inf")` for never.
+        time_limit: Seconds until an episode is cut off, the task's if left out; `float("inf")`
+            for never.
         environment_kwargs: More for dm_control's `Environment`, such as `flat_observation`.
         visualize_reward: Colour the poles by the reward, in pictures.
 
@@ -285,7 +301,11 @@ def load(
         ConfigError: There is no such task, or a setting makes no sense.
         ModelError: The model cannot be used.
     """
-    check_known("task", task_name, TASKS)
+    known = {BALANCE: CARTPOLE_V1, **TASKS}
+    check_known("task", task_name, known)
+    rules = known[task_name]
+    if time_limit is None:
+        time_limit = rules.time_limit * CONTROL_STEP
     if not time_limit > 0:
         raise ConfigError(f"time_limit must be more than 0 seconds, not {time_limit}")
     if seed is not None and seed < 0:
@@ -294,7 +314,7 @@ def load(
     limit = time_limit
     if not math.isinf(time_limit):
         limit = max(1, round(time_limit / cartpole.control_step))
-    balance = Balance(cartpole, random=seed, limit=limit, discrete=discrete)
+    balance = Balance(cartpole, random=seed, limit=limit, discrete=discrete, rules=rules)
     balance.visualize_reward = visualize_reward
     # Without dm_control's half steps, a step is one call of mj_step, whatever the solver.
     settings = {"legacy_step": False, **(environment_kwargs or {})}

@@ -9,7 +9,6 @@ from typing import Any, Final
 import numpy as np
 from gymnasium import logger, spaces
 
-from mjcartpole import task
 from mjcartpole.envs.editable import Editable
 from mjcartpole.errors import ConfigError, MjCartPoleError, SettingError
 from mjcartpole.physics.bodies import cart_bodies, mass_of, pole_bodies
@@ -18,6 +17,7 @@ from mjcartpole.physics.edit.rescale import length_of
 from mjcartpole.physics.parameters import forces_of, pole_of
 from mjcartpole.physics.simulation import LARGEST_SANE, Simulation
 from mjcartpole.physics.structure import directions
+from mjcartpole.task import Task, in_words
 
 Numbers = float | tuple[float, ...]
 """A number, or one for each of several poles."""
@@ -89,9 +89,7 @@ def _edit_poles(key: str, times: float = 1.0) -> Edits:
         if cartpole.poles == 1:
             return {f"pole.{key}": times * float(value)}
         if np.shape(value) != (cartpole.poles,):
-            raise ConfigError(
-                f"the model has {task.in_words(cartpole.poles)}, give one number each"
-            )
+            raise ConfigError(f"the model has {in_words(cartpole.poles)}, give one number each")
         return {f"pole{n}.{key}": times * float(each) for n, each in enumerate(value, start=1)}
 
     return edits
@@ -161,6 +159,7 @@ class CartPoleNames:
     """
 
     observation_space: spaces.Space[Any]
+    _task: Task
     _model: Editable
     _simulation: Simulation | None
     _limits: tuple[float, float, float, float]
@@ -228,9 +227,16 @@ class CartPoleNames:
     def _set_limits(self, x: float, theta: float) -> None:
         self._limits = -x, x, -theta, theta
         # Narrower limits leave the space as it is: an episode may start beyond them.
-        farthest = max(x, task.X_LIMIT), max(theta, task.THETA_LIMIT)
-        bound = task.observation_bound(self._model.base.poles, *farthest)
+        task = self._task
+        farthest = max(x, task.x_limit), max(theta, task.theta_limit)
+        rules = dataclasses.replace(task, x_limit=farthest[0], theta_limit=farthest[1])
+        bound = rules.observation_bound(self._model.base.poles)
         self.observation_space = spaces.Box(-bound, bound, dtype=np.float32)
+
+    @property
+    def task(self) -> Task:
+        """The rules that the environment was made with."""
+        return self._task
 
     @property
     def steps_beyond_terminated(self) -> int | None:
@@ -265,13 +271,19 @@ class FixedNames:
     """CartPole-v1's names of many environments: read only, since edits are made at the start."""
 
     cartpole: CartPole
+    _task: Task
+
+    @property
+    def task(self) -> Task:
+        """The rules that the environments were made with."""
+        return self._task
 
     def __getattr__(self, name: str) -> Any:  # noqa: ANN401 - any of several
         number = vars(CartPoleNames).get(name)
         if isinstance(number, Number):
             return number.read(self.cartpole)
         if name in _LIMITS:
-            return _LIMITS[name]
+            return getattr(self._task, _LIMITS[name])
         raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
 
     def __setattr__(self, name: str, value: object) -> None:
@@ -284,7 +296,7 @@ class FixedNames:
         super().__setattr__(name, value)
 
 
-_LIMITS: Final = {"x_threshold": task.X_LIMIT, "theta_threshold_radians": task.THETA_LIMIT}
+_LIMITS: Final = {"x_threshold": "x_limit", "theta_threshold_radians": "theta_limit"}
 
 SETTABLE: Final = (
     *(each.name for each in vars(CartPoleNames).values() if isinstance(each, Number)),

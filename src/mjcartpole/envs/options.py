@@ -2,12 +2,12 @@
 
 import math
 from collections.abc import Mapping
-from typing import Any, Final, NamedTuple
+from typing import Any, NamedTuple, SupportsFloat
 
 from gymnasium.envs.classic_control.utils import maybe_parse_reset_bounds
 
-from mjcartpole import task
 from mjcartpole.errors import ConfigError
+from mjcartpole.task import CARTPOLE_V1, Task
 
 
 class ResetOptions(NamedTuple):
@@ -19,27 +19,30 @@ class ResetOptions(NamedTuple):
         edits: Changes of the model (see `load_model`); empty for none.
     """
 
-    low: float = task.RESET_LOW
-    high: float = task.RESET_HIGH
+    low: float = CARTPOLE_V1.start_low
+    high: float = CARTPOLE_V1.start_high
     edits: Any = ()
 
 
-USUAL: Final = ResetOptions()
-"""Without options."""
+def usual(task: Task) -> ResetOptions:
+    """Return how an episode of a task starts without options."""
+    return ResetOptions(task.start_low, task.start_high)
 
 
-def reset_options(options: Mapping[str, Any] | None) -> ResetOptions:
-    """The options of a reset, checked; what is left out is as usual.
+def reset_options(options: Mapping[str, Any], otherwise: ResetOptions) -> ResetOptions:
+    """Return the options of a reset, checked.
+
+    Args:
+        options: As they were given.
+        otherwise: What holds where they say nothing.
 
     Raises:
         ConfigError: There is no such option, a bound is no finite number, or low is above high.
     """
-    if options is None:
-        return USUAL
-    given = USUAL._replace(**_known(options))
+    given = otherwise._replace(**_known(options))
     try:
         # In gymnasium's own words, which CartPole-v1's users know.
-        low, high = maybe_parse_reset_bounds({"low": given.low, "high": given.high}, *USUAL[:2])
+        low, high = maybe_parse_reset_bounds({"low": given.low, "high": given.high}, *otherwise[:2])
     except (ValueError, OverflowError) as error:
         raise ConfigError(str(error)) from error
     if not math.isfinite(high - low):
@@ -58,3 +61,46 @@ def _known(options: Mapping[str, Any]) -> Mapping[str, Any]:
             "env.unwrapped.state = (…)"
         )
     return options
+
+
+def start_bounds(
+    task: Task, options: Mapping[str, Any] | None, *others: str
+) -> tuple[float, float]:
+    """Return bounds of the starting states' values, as the vector's `reset(options=…)` gives them.
+
+    >>> start_bounds(CARTPOLE_V1, {"low": -0.01})
+    (-0.01, 0.05)
+
+    Args:
+        task: Says where episodes start otherwise.
+        options: What `reset` was given.
+        others: Options beside "low" and "high" that are read elsewhere.
+
+    Raises:
+        ConfigError: An option is unknown, a bound is no finite number, or low is above high.
+    """
+    known = ("low", "high", *others)
+    if not isinstance(options, Mapping | None):
+        raise ConfigError(f"options of reset are a dict, not {options!r}")
+    for name in options or {}:
+        if name not in known:
+            raise ConfigError(
+                f"reset has no option {name!r}; available: {', '.join(known)}. What belongs to the "
+                "model or the rules is given where the environment is made"
+            )
+    given = {"low": task.start_low, "high": task.start_high, **(options or {})}
+    low, high = (_finite(name, given[name]) for name in ("low", "high"))
+    if low > high:
+        raise ConfigError(f"low ({low}) is above high ({high}); the starting state lies between")
+    _finite("the distance from low to high", high - low)
+    return low, high
+
+
+def _finite(name: str, value: SupportsFloat | str) -> float:
+    try:
+        number = float(value)
+    except (TypeError, ValueError, OverflowError):
+        number = math.nan
+    if not math.isfinite(number):
+        raise ConfigError(f"{name} is a finite number, not {value!r}")
+    return number

@@ -10,6 +10,7 @@ from gymnasium.envs.registration import EnvSpec
 
 from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.load import is_its_document
+from mjcartpole.task import Task
 
 
 def portable(spec: EnvSpec, cartpole: CartPole) -> EnvSpec:
@@ -38,6 +39,8 @@ def portable(spec: EnvSpec, cartpole: CartPole) -> EnvSpec:
 
 
 def _plain(value: Any) -> Any:  # noqa: ANN401 - whatever it is
+    if isinstance(value, Task):
+        return value.name
     if hasattr(value, "tolist"):
         return value.tolist()
     if isinstance(value, os.PathLike):

@@ -10,8 +10,8 @@ from gymnasium import logger, spaces
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from mjcartpole import task
 from mjcartpole.envs.names import FixedNames
+from mjcartpole.envs.options import start_bounds
 from mjcartpole.envs.registration import ENV_ID
 from mjcartpole.errors import ConfigError, InvalidActionError, ResetNeededError
 from mjcartpole.integrator import Integrator
@@ -19,6 +19,16 @@ from mjcartpole.media.renderer import DEFAULT_HEIGHT, DEFAULT_WIDTH, Renderer, o
 from mjcartpole.media.scene import DEFAULT_CAMERA, check_picture
 from mjcartpole.physics.batch_simulation import BatchSimulation
 from mjcartpole.physics.load import Edits, ModelLike, load_model
+from mjcartpole.task import (
+    CARTPOLE_V1,
+    CONSTANT,
+    N_ACTIONS,
+    Task,
+    frame_rate,
+    resolve,
+    state_names,
+    worst_pole,
+)
 
 VectorRenderMode = Literal["rgb_array", "rgb_array_list"]
 
@@ -76,11 +86,12 @@ class CartPoleVectorEnv(
     | Parameter             | Type                   | Default     | Description                   |
     |-----------------------|------------------------|-------------|-------------------------------|
     | `num_envs`            | int                    | 1           | How many environments         |
-    | `max_episode_steps`   | int                    | 500         | Steps until truncation        |
+    | `max_episode_steps`   | int or None            | None        | Steps until truncation; None: the task's 500 |
     | `model`               | str, path, MjSpec      | "cartpole"  | As in `CartPoleEnv`           |
     | `edits`               | dict                   | None        | Edits of the model, such as `{"pole.length": 1.5}` |
     | `own_timestep`        | bool                   | False       | One physics step of the file per action, instead of 0.02 s |
     | `integrator`          | "gym" or "mujoco"      | "gym"       | As in `CartPoleEnv`           |
+    | `task`                | str, Task              | "CartPole-v1" | As in `CartPoleEnv`         |
     | `sutton_barto_reward` | bool                   | False       | 0 per step and -1 at termination, instead of 1 per step |
     | `threads`             | int or None            | None        | Threads that step; None: as many as pay, which the time decides |
     | `render_mode`         | None, "rgb_array", "rgb_array_list" | None | Nothing, or one picture per environment (the two are the same, as in gymnasium's vector) |
@@ -103,7 +114,7 @@ class CartPoleVectorEnv(
 
     metadata: dict[str, Any] = {  # noqa: RUF012 - gymnasium's own declaration
         "render_modes": ["rgb_array"],
-        "render_fps": task.frame_rate(),
+        "render_fps": frame_rate(),
         "autoreset_mode": AutoresetMode.NEXT_STEP,
     }
 
@@ -111,11 +122,12 @@ class CartPoleVectorEnv(
         self,
         num_envs: int = 1,
         *,
-        max_episode_steps: int = task.TIME_LIMIT,
+        max_episode_steps: int | None = None,
         model: ModelLike = "cartpole",
         edits: Edits = None,
         own_timestep: bool = False,
         integrator: Integrator = "gym",
+        task: Task | str = CARTPOLE_V1,
         sutton_barto_reward: bool = False,
         threads: int | None = None,
         render_mode: VectorRenderMode | None = None,
@@ -127,12 +139,15 @@ class CartPoleVectorEnv(
 
         Raises:
             ModelError: The model cannot be found, has an error, or is no cart-pole.
-            ConfigError: The integrator or the render mode is unknown, or `num_envs`,
+            ConfigError: The integrator, the task or the render mode is unknown, or `num_envs`,
                 `max_episode_steps` or `threads` is no whole number from 1.
             RenderError: The size of a picture makes no sense, or the model has no such camera.
         """
         self.num_envs = _count("num_envs", num_envs)
-        self.max_episode_steps = _count("max_episode_steps", max_episode_steps)
+        rules = resolve(task)
+        self._task = rules.with_sutton_barto_reward() if sutton_barto_reward else rules
+        steps = rules.time_limit if max_episode_steps is None else max_episode_steps
+        self.max_episode_steps = _count("max_episode_steps", steps)
         threads = None if threads is None else _count("threads", threads)
         _check_render_mode(render_mode)
         self.render_mode = render_mode
@@ -141,13 +156,12 @@ class CartPoleVectorEnv(
         self._controls = np.array(self.cartpole.controls)
         if render_mode is not None or (width, height, camera) != _DEFAULT_PICTURE:
             check_picture(self.cartpole, width, height, camera)
-        self.metadata = self.metadata | {"render_fps": task.frame_rate(self.cartpole.control_step)}
-        bound = task.observation_bound(self.cartpole.poles)
+        self.metadata = self.metadata | {"render_fps": frame_rate(self.cartpole.control_step)}
+        bound = self._task.observation_bound(self.cartpole.poles)
         self.single_observation_space = spaces.Box(-bound, bound, dtype=np.float32)
-        self.single_action_space = spaces.Discrete(task.N_ACTIONS)
+        self.single_action_space = spaces.Discrete(N_ACTIONS)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
-        self._sutton_barto_reward = sutton_barto_reward
         self._prepare_episodes()
         self._open_renderer = functools.partial(
             open_renderer, self.cartpole, width=width, height=height, camera=camera
@@ -156,7 +170,7 @@ class CartPoleVectorEnv(
 
     def _prepare_episodes(self) -> None:
         """Make what lives from step to step."""
-        self._bounds = task.RESET_LOW, task.RESET_HIGH
+        self._bounds = self._task.start_low, self._task.start_high
         self._has_state = False
         # Steps so far, and at which of them each episode is truncated.
         self._clock = 0
@@ -193,7 +207,7 @@ class CartPoleVectorEnv(
         if values.shape != shape:
             raise ConfigError(
                 f"states have the shape {shape}: one row each of "
-                f"{', '.join(task.state_names(self.cartpole.poles))}, one column per environment, "
+                f"{', '.join(state_names(self.cartpole.poles))}, one column per environment, "
                 f"not the shape {values.shape}"
             )
         self._simulation.set_state(_EVERYONE, values.T)
@@ -216,7 +230,7 @@ class CartPoleVectorEnv(
             ConfigError: An option is unknown, or makes no sense.
             ResetNeededError: Some are to start before all have started once.
         """
-        bounds = task.start_bounds(options, "reset_mask")
+        bounds = start_bounds(self._task, options, "reset_mask")
         who = self._mask((options or {}).get("reset_mask"))
         super().reset(seed=seed)
         self._bounds = bounds
@@ -306,15 +320,21 @@ class CartPoleVectorEnv(
     def _have_terminated(self) -> npt.NDArray[np.bool_]:
         """Whose state is beyond a limit, shape (num_envs,); a new array."""
         sizes = self._simulation.sizes()
-        over = sizes[:, 0] > task.X_LIMIT
+        over = sizes[:, 0] > self._task.x_limit
         for pole in range(self.cartpole.poles):
-            over |= sizes[:, 2 + 2 * pole] > task.THETA_LIMIT
+            over |= sizes[:, 2 + 2 * pole] > self._task.theta_limit
         return over
 
     def _rewards(self, terminations: npt.NDArray[np.bool_]) -> npt.NDArray[np.float32]:
-        if self._sutton_barto_reward:
-            return np.subtract(0.0, terminations, dtype=np.float32)
-        return np.ones(self.num_envs, dtype=np.float32)
+        reward = self._task.reward
+        constant = CONSTANT.get(reward)
+        if constant is not None:
+            rewards = np.full(self.num_envs, constant, dtype=np.float32)
+            rewards[terminations] = reward(0.0, 0.0, 0.0, 0.0, True)
+            return rewards
+        pairs = zip(self._simulation.state.tolist(), terminations.tolist(), strict=True)
+        values = [reward(*worst_pole(state), over) for state, over in pairs]
+        return np.array(values, dtype=np.float32)
 
     def _draw(self, n: int) -> npt.NDArray[np.float64]:
         """Starting states of n environments, one row each, drawn in gymnasium's order."""

@@ -258,15 +258,10 @@ def _state_of(
 
 
 def as_one_pole(step: Callable[[float], State]) -> Callable[[float], State]:
-    """Return steps of several poles that give what the rules look at: the worst of all.
-
-    That is `(x, x_dot, theta, theta_dot)` with the largest angle and the largest angular velocity,
-    without signs.
-    """
+    """Return steps of several poles that give what the rules look at: the worst of all."""
 
     def advance(control: float) -> State:
-        state = step(control)
-        return state[0], state[1], task.max_abs(state[2::2]), task.max_abs(state[3::2])
+        return task.worst_pole(step(control))
 
     return advance
 

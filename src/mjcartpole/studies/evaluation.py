@@ -16,6 +16,7 @@ from mjcartpole.learning.engine import Engine, choose_engine
 from mjcartpole.learning.episodes import ENDINGS, Episode
 from mjcartpole.learning.loop import play_episode
 from mjcartpole.learning.policy import Policy
+from mjcartpole.task import CARTPOLE_V1, Task, resolve
 
 if TYPE_CHECKING:
     from mjcartpole.physics.load import ModelLike
@@ -87,6 +88,7 @@ def evaluate(
     backend: Backend = "mujoco",
     model: "ModelLike" = "cartpole",
     integrator: Integrator = "gym",
+    task: Task | str = CARTPOLE_V1,
     episodes: int = EPISODES,
     seed: int = SEED,
     engine: Engine = "compiled",
@@ -98,6 +100,7 @@ def evaluate(
         backend: Who does the physics.
         model: See `load_model`; for backend mujoco.
         integrator: See `Simulation`.
+        task: The rules, or their name.
         episodes: How many to play, at least 1.
         seed: Seeds the starting states.
         engine: Who runs the loop; the compiled one needs a `Policy`, and any other function is
@@ -110,6 +113,7 @@ def evaluate(
     """
     check_count(episodes, seed)
     check_backend(backend, model, integrator)
+    rules = resolve(task)
     if backend == "mujoco":
         from mjcartpole.physics.load import load_model  # noqa: PLC0415 - it imports MuJoCo
 
@@ -123,9 +127,9 @@ def evaluate(
         from mjcartpole.learning.compiled import CompiledLoop  # noqa: PLC0415 - it is heavy
 
         rng, _ = seeding.np_random(seed)
-        log = CompiledLoop(backend, model, integrator).play(policy, rng, episodes)
+        log = CompiledLoop(backend, model, integrator, rules).play(policy, rng, episodes)
         return Evaluation(backend, seed, tuple(log))
-    env = make_env(backend, model, integrator)
+    env = make_env(backend, model, integrator, rules)
     played = tuple(
         play_episode(env, policy, number=number, seed=seed if number == 0 else None)[0]
         for number in range(episodes)

@@ -2,6 +2,7 @@
 
 import contextlib
 import functools
+import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Final
@@ -12,7 +13,7 @@ import numpy.typing as npt
 from mjcartpole.envs.backend import Backend, make_env
 from mjcartpole.errors import RenderError
 from mjcartpole.integrator import Integrator
-from mjcartpole.learning.episodes import Episode
+from mjcartpole.learning.episodes import ENDINGS, Episode
 from mjcartpole.learning.loop import play_episode
 from mjcartpole.learning.policy import Policy
 from mjcartpole.media.hud import Moment
@@ -33,7 +34,7 @@ from mjcartpole.media.video import DEFAULT_FPS
 from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.load import ModelLike, load_model
 from mjcartpole.studies.evaluation import SEED, check_count
-from mjcartpole.task import CONTROL_STEP, N_ACTIONS
+from mjcartpole.task import CARTPOLE_V1, CONTROL_STEP, N_ACTIONS, Task, worst_pole
 
 FALL_SECONDS: Final = 1.0
 """How much of an episode's end a film of its fall shows."""
@@ -61,6 +62,7 @@ class PolicySetup:
         model: What moves, for backend mujoco; gymnasium's cart-pole is drawn as the reference.
         integrator: See `Simulation`.
         seed: Seeds the first episode's starting state.
+        task: The rules.
     """
 
     name: str
@@ -69,6 +71,7 @@ class PolicySetup:
     model: ModelLike = "cartpole"
     integrator: Integrator = "gym"
     seed: int = SEED
+    task: Task = CARTPOLE_V1
 
     @functools.cached_property
     def cartpole(self) -> CartPole:
@@ -154,6 +157,15 @@ class Rollout:
         """Where in the episode each frame of a film lies, in control steps."""
         return look.places(len(self.states), self.setup.cartpole.control_step)
 
+    @functools.cached_property
+    def totals(self) -> list[float]:
+        """The return so far at each state, shape (steps + 1,)."""
+        rewards, last = [0.0], len(self.states) - 1
+        for step, state in enumerate(self.states.tolist()[1:], start=1):
+            terminated = step == last and self.episode.ending != ENDINGS[0]
+            rewards.append(self.setup.task.reward(*worst_pole(state), terminated))
+        return list(itertools.accumulate(rewards))
+
     def moment(self, place: float) -> Moment:
         """What an overlay says at a place between control steps."""
         step, policy = int(place + _ROUNDING), self.setup.policy
@@ -163,7 +175,7 @@ class Rollout:
         observation = self.states[step].astype(np.float32)
         row = policy.discretizer(observation.tolist())
         left, right = policy.q_table.reshape(-1, N_ACTIONS)[row].tolist()
-        return Moment(step, float(step), state, policy(observation), (left, right))
+        return Moment(step, self.totals[step], state, policy(observation), (left, right))
 
 
 def play(setup: PolicySetup, episodes: int = 1) -> list[Rollout]:
@@ -177,7 +189,9 @@ def play(setup: PolicySetup, episodes: int = 1) -> list[Rollout]:
     check_count(episodes, setup.seed)
     setup.policy.check_fits(setup.cartpole.poles, setup.cartpole.name)
     takes = []
-    with contextlib.closing(make_env(setup.backend, setup.model, setup.integrator)) as env:
+    with contextlib.closing(
+        make_env(setup.backend, setup.model, setup.integrator, setup.task)
+    ) as env:
         for number in range(episodes):
             seed = setup.seed if number == 0 else None
             episode, states = play_episode(env, setup.policy, number=number, seed=seed)
@@ -208,8 +222,7 @@ class Film:
         self._look = look
         with contextlib.ExitStack() as opened:
             self._renderers = [
-                opened.enter_context(_open_renderer(takes[0].setup.cartpole, look))
-                for takes in casts
+                opened.enter_context(_open_renderer(takes[0].setup, look)) for takes in casts
             ]
             self._open = opened.pop_all()
         self.length = sum(
@@ -250,8 +263,13 @@ class Film:
             yield frame if overlay is None else overlay.draw(frame, take.moment(place))
 
 
-def _open_renderer(cartpole: CartPole, look: VideoOptions) -> Renderer:
-    look.check(cartpole)
+def _open_renderer(setup: PolicySetup, look: VideoOptions) -> Renderer:
+    look.check(setup.cartpole)
     return open_renderer(
-        cartpole, width=look.width, height=look.height, camera=look.camera, quality=look.quality
+        setup.cartpole,
+        width=look.width,
+        height=look.height,
+        camera=look.camera,
+        quality=look.quality,
+        task=setup.task,
     )

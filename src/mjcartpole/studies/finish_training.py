@@ -53,12 +53,13 @@ def finish_training(
 def evaluate_where_trained(
     policy: Policy, config: TrainConfig, cartpole: CartPole, engine: Engine
 ) -> Evaluation:
-    """Play a greedy policy on the backend, model and integrator that it was trained on."""
+    """Play a greedy policy as it was trained: backend, model, integrator, task."""
     return evaluate(
         policy,
         backend=config.backend,
         model=cartpole if config.backend == "mujoco" else "cartpole",
         integrator=config.integrator,
+        task=config.rules,
         engine=engine,
     )
 

@@ -8,9 +8,9 @@ from typing import Final
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from mjcartpole import task
 from mjcartpole.studies.sweep import SweepResult
 from mjcartpole.studies.transfer import Cell, TransferResult
+from mjcartpole.task import CARTPOLE_V1
 
 Colour = tuple[int, int, int]
 Point = tuple[float, float]
@@ -43,7 +43,7 @@ def heat_map(result: TransferResult) -> Image.Image:
     slant = math.ceil(max(font.getlength(name) for name in columns))
     top = 52 + round(slant * 0.71) + 12
     width = left + wide * len(columns) + max(pad, round(slant * 0.71) - wide // 2 + 24)
-    foot = f"0 to {task.TIME_LIMIT}; below: 95 % interval over {_episodes(result)} episodes"
+    foot = f"0 to {CARTPOLE_V1.time_limit}; below: 95 % interval over {_episodes(result)} episodes"
     width = max(width, math.ceil(small.getlength(foot)) + 2 * pad)
     picture = Image.new("RGB", (width, top + high * len(names) + 40), PAPER)
     pen = ImageDraw.Draw(picture)
@@ -66,10 +66,10 @@ def curves(result: SweepResult) -> Image.Image:
     box = (left, top, width - right, high - bottom)
     picture = Image.new("RGB", (width * _FINE, high * _FINE), PAPER)
     fine = ImageDraw.Draw(picture, "RGBA")
-    xs, ys = _ticks(result.values[0], result.values[-1]), range(0, task.TIME_LIMIT + 1, 100)
+    xs, ys = _ticks(result.values[0], result.values[-1]), range(0, CARTPOLE_V1.time_limit + 1, 100)
     axes = _Axes(box, (result.values[0], result.values[-1]))
     for x in xs:
-        _line(fine, [axes.at(x, 0), axes.at(x, task.TIME_LIMIT)], GRID)
+        _line(fine, [axes.at(x, 0), axes.at(x, CARTPOLE_V1.time_limit)], GRID)
     for y in ys:
         _line(fine, [axes.at(result.values[0], y), axes.at(result.values[-1], y)], GRID)
     ends = [axes.at(x, result.threshold) for x in (result.values[0], result.values[-1])]
@@ -98,12 +98,12 @@ class _Axes:
         """Pixels of a value and a return."""
         left, top, right, bottom = self.box
         share = (x - self._low) / self._width
-        return left + share * (right - left), bottom - y / task.TIME_LIMIT * (bottom - top)
+        return left + share * (right - left), bottom - y / CARTPOLE_V1.time_limit * (bottom - top)
 
 
 def _draw_cell(pen: ImageDraw.ImageDraw, cell: Cell, box: tuple[int, int, int, int]) -> None:
     x, y, wide, high = box
-    colour = NOTHING if cell.evaluation is None else _colour(cell.mean / task.TIME_LIMIT)
+    colour = NOTHING if cell.evaluation is None else _colour(cell.mean / CARTPOLE_V1.time_limit)
     pen.rectangle((x + 1, y + 1, x + wide - 2, y + high - 2), fill=colour)
     ink = INK if _lightness(colour) > 140 else PAPER
     number = "failed" if cell.interval is None else f"{cell.mean:.1f}"

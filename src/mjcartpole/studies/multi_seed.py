@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from multiprocessing.synchronize import Event
 from pathlib import Path
 
-from mjcartpole import task
 from mjcartpole.errors import ConfigError, MjCartPoleError, RunError
 from mjcartpole.learning import runs
 from mjcartpole.learning.checkpoints import Checkpoint
@@ -85,7 +84,7 @@ class ManyResult:
         """Statistics over the scores; None where there are none."""
         if not self.scores:
             return None
-        return aggregate(self.scores, solved_at=task.REWARD_THRESHOLD)
+        return aggregate(self.scores, solved_at=self.config.rules.reward_threshold)
 
     def __repr__(self) -> str:
         count, scores = len(self.seeds), self.scores

@@ -45,8 +45,8 @@ class Aggregate:
         iqm: Their interquartile mean.
         interval: The 95 % bootstrap interval of `iqm`.
         minimum: The worst score.
-        solved_at: A score from here up counts as solved.
-        solved: Share of scores that do, 0 to 1.
+        solved_at: A score from here up counts as solved; None where nothing is agreed.
+        solved: Share of scores that do, 0 to 1; None as above.
     """
 
     count: int
@@ -54,8 +54,8 @@ class Aggregate:
     iqm: float
     interval: Interval
     minimum: float
-    solved_at: float
-    solved: float
+    solved_at: float | None
+    solved: float | None
 
     def summary(self) -> dict[str, Any]:
         """The figures as plain values, for JSON."""
@@ -71,7 +71,7 @@ class Aggregate:
         }
 
 
-def aggregate(scores: npt.ArrayLike, *, solved_at: float, seed: int = 0) -> Aggregate:
+def aggregate(scores: npt.ArrayLike, *, solved_at: float | None, seed: int = 0) -> Aggregate:
     """Sum up the scores of several runs.
 
     Args:
@@ -83,7 +83,7 @@ def aggregate(scores: npt.ArrayLike, *, solved_at: float, seed: int = 0) -> Aggr
         ConfigError: The scores are empty, not finite or of another shape, or a setting makes no
             sense.
     """
-    if not math.isfinite(solved_at):
+    if not (solved_at is None or math.isfinite(solved_at)):
         raise ConfigError(f"solved_at must be a finite number, not {solved_at}")
     values = _checked(scores)
     return Aggregate(
@@ -92,8 +92,8 @@ def aggregate(scores: npt.ArrayLike, *, solved_at: float, seed: int = 0) -> Aggr
         iqm=iqm(values),
         interval=bootstrap_interval(values, seed=seed),
         minimum=float(values.min()),
-        solved_at=float(solved_at),
-        solved=float((values >= solved_at).mean()),
+        solved_at=solved_at,
+        solved=None if solved_at is None else float((values >= solved_at).mean()),
     )
 
 

@@ -9,7 +9,6 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from mjcartpole import task
 from mjcartpole.errors import ConfigError
 from mjcartpole.integrator import Integrator
 from mjcartpole.learning.policy import Policy
@@ -17,6 +16,7 @@ from mjcartpole.physics.edit.edits import edits_of
 from mjcartpole.physics.load import Edits, ModelLike, load_model
 from mjcartpole.studies.evaluation import EPISODES, SEED, check_count
 from mjcartpole.studies.transfer import GYM, Cell, TransferResult, find_place, transfer
+from mjcartpole.task import CARTPOLE_V1
 
 MOST_VALUES: Final = 1_000
 
@@ -59,7 +59,7 @@ class SweepResult:
     values: tuple[float, ...]
     model: str
     played: TransferResult
-    threshold: float = task.REWARD_THRESHOLD
+    threshold: float = CARTPOLE_V1.reward_threshold
 
     def __repr__(self) -> str:
         span = f"{self.key} from {self.values[0]:g} to {self.values[-1]:g} on {self.model}"

@@ -9,12 +9,12 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from mjcartpole import task
 from mjcartpole.envs.backend import GYM_ID
 from mjcartpole.studies.parity.case import Subject
 from mjcartpole.studies.parity.result import Figure, Result
+from mjcartpole.task import CARTPOLE_V1
 
-LIMITS = ((0, task.X_LIMIT), (2, task.THETA_LIMIT))
+LIMITS = ((0, CARTPOLE_V1.x_limit), (2, CARTPOLE_V1.theta_limit))
 STEPS_BEYOND_THE_END = 4
 
 
@@ -69,7 +69,7 @@ def _outcomes(env: gymnasium.Env[Any, Any], place: int, value: float) -> list[tu
 def _time_limit(env: gymnasium.Env[Any, Any]) -> int:
     """Steps until truncation, with the pole held upright."""
     env.reset(seed=0)
-    for step in range(1, 10 * task.TIME_LIMIT):
+    for step in range(1, 10 * CARTPOLE_V1.time_limit):
         env.unwrapped.state = np.zeros(4)  # type: ignore[attr-defined]
         _, _, terminated, truncated, _ = env.step(1)
         if terminated or truncated:

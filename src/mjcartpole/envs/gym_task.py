@@ -1,0 +1,43 @@
+"""Gymnasium's own CartPole-v1 under the rules of another task."""
+
+from typing import Any
+
+import gymnasium
+import numpy as np
+import numpy.typing as npt
+from gymnasium import spaces
+
+from mjcartpole.task import Task
+
+Observation = npt.NDArray[np.float32]
+
+
+class GymTask(gymnasium.Wrapper[Observation, np.int64, Observation, np.int64]):
+    """CartPole-v1's equations with the limits, starting states and rewards of a task.
+
+    Args:
+        env: Gymnasium's environment, with the task's time limit.
+        task: The rules.
+    """
+
+    def __init__(self, env: gymnasium.Env[Observation, np.int64], task: Task) -> None:
+        super().__init__(env)
+        self._task, self._cartpole = task, env.unwrapped
+        self._cartpole.x_threshold = task.x_limit  # type: ignore[attr-defined]
+        self._cartpole.theta_threshold_radians = task.theta_limit  # type: ignore[attr-defined]
+        bound = task.observation_bound()
+        self.observation_space = spaces.Box(-bound, bound, dtype=np.float32)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Start an episode where the task does, unless the options say otherwise."""
+        bounds = {"low": self._task.start_low, "high": self._task.start_high}
+        return self.env.reset(seed=seed, options=bounds | (options or {}))
+
+    def step(self, action: np.int64) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+        """Advance one control step; the reward is the task's."""
+        observation, _, terminated, truncated, info = self.env.step(action)
+        x, x_dot, theta, theta_dot = map(float, self._cartpole.state)  # type: ignore[attr-defined]
+        reward = self._task.reward(x, x_dot, theta, theta_dot, terminated)
+        return observation, reward, terminated, truncated, info
