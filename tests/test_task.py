@@ -1,29 +1,34 @@
-"""CartPole-v1's rules, on both sides of every limit."""
+"""Tasks: CartPole-v1's rules on both sides of every limit, and rules that make no sense."""
 
 import math
 
 import gymnasium
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from mjcartpole import task
-from mjcartpole.task import CARTPOLE_V1
+from mjcartpole.envs.registration import register_task
+from mjcartpole.errors import ConfigError
+from mjcartpole.task import CARTPOLE_V1, TASKS, Task, resolve, worst_pole
 
 UP = math.inf
+X, THETA = CARTPOLE_V1.x_limit, CARTPOLE_V1.theta_limit
 
 
 @pytest.mark.parametrize(
     ("x", "theta", "over"),
     [
         (0.0, 0.0, False),
-        (CARTPOLE_V1.x_limit, 0.0, False),
-        (math.nextafter(CARTPOLE_V1.x_limit, UP), 0.0, True),
-        (-CARTPOLE_V1.x_limit, 0.0, False),
-        (math.nextafter(-CARTPOLE_V1.x_limit, -UP), 0.0, True),
-        (0.0, CARTPOLE_V1.theta_limit, False),
-        (0.0, math.nextafter(CARTPOLE_V1.theta_limit, UP), True),
-        (0.0, -CARTPOLE_V1.theta_limit, False),
-        (0.0, math.nextafter(-CARTPOLE_V1.theta_limit, -UP), True),
+        (X, 0.0, False),
+        (math.nextafter(X, UP), 0.0, True),
+        (-X, 0.0, False),
+        (math.nextafter(-X, -UP), 0.0, True),
+        (0.0, THETA, False),
+        (0.0, math.nextafter(THETA, UP), True),
+        (0.0, -THETA, False),
+        (0.0, math.nextafter(-THETA, -UP), True),
         (UP, 0.0, True),
     ],
 )
@@ -31,29 +36,69 @@ def test_termination_is_strict(x, theta, over):
     assert CARTPOLE_V1.has_ended(x, theta) is over
 
 
+def test_no_limits_end_nothing():
+    free = Task("free", x_limit=UP, theta_limit=UP)
+    assert not free.has_ended(1e300, -1e300)
+    assert (free.observation_bound() == np.inf).all()
+
+
 def test_numbers_are_gymnasiums():
     env = gymnasium.make("CartPole-v1").unwrapped
     assert env.tau == task.CONTROL_STEP
-    assert env.x_threshold == CARTPOLE_V1.x_limit
-    assert env.theta_threshold_radians == CARTPOLE_V1.theta_limit
+    assert (env.x_threshold, env.theta_threshold_radians) == (X, THETA)
     np.testing.assert_array_equal(CARTPOLE_V1.observation_bound(), env.observation_space.high)
     spec = gymnasium.spec("CartPole-v1")
-    assert (spec.max_episode_steps, 475.0) == (CARTPOLE_V1.time_limit, CARTPOLE_V1.reward_threshold)
+    assert spec.max_episode_steps == CARTPOLE_V1.time_limit
+    assert spec.reward_threshold == CARTPOLE_V1.reward_threshold
+
+
+@pytest.mark.parametrize(("terminated", "sutton_barto"), [(False, 0.0), (True, -1.0)])
+def test_reward(terminated, sutton_barto):
+    state = (0.1, 0.2, 0.3, 0.4)
+    assert CARTPOLE_V1.reward(*state, terminated) == 1.0
+    assert CARTPOLE_V1.with_sutton_barto_reward().reward(*state, terminated) == sutton_barto
+
+
+@pytest.mark.parametrize("reward", task.CONSTANT)
+@given(state=st.tuples(*[st.floats(allow_nan=False)] * 4))
+def test_constant_rewards_are_constant(reward, state):
+    assert reward(*state, False) == task.CONSTANT[reward]
+    assert reward(*state, True) == reward(0.0, 0.0, 0.0, 0.0, True)
 
 
 @pytest.mark.parametrize(
-    ("terminated", "already_over", "plain", "sutton_barto"),
+    "rules",
     [
-        (False, False, 1.0, 0.0),
-        (True, False, 1.0, -1.0),
-        (True, True, 0.0, -1.0),
-        (False, True, 1.0, 0.0),
+        {"x_limit": 0.0},
+        {"theta_limit": -1.0},
+        {"x_limit": math.nan},
+        {"start_low": 0.1, "start_high": 0.0},
+        {"start_high": UP},
+        {"time_limit": 0},
+        {"time_limit": 10.5},
+        {"reward": 1.0},
     ],
 )
-def test_reward(terminated, already_over, plain, sutton_barto):
-    arguments = {"terminated": terminated, "already_over": already_over}
-    assert task.reward(**arguments, sutton_barto=False) == plain
-    assert task.reward(**arguments, sutton_barto=True) == sutton_barto
-    # Compiled code has no names for arguments.
-    assert task.reward(terminated, already_over, False) == plain
-    assert task.reward(terminated, already_over, True) == sutton_barto
+def test_rules_that_make_no_sense(rules):
+    with pytest.raises(ConfigError, match=next(iter(rules))):
+        Task("odd", **rules)
+
+
+def test_the_worst_pole_is_what_the_rules_look_at():
+    assert worst_pole((1.0, 2.0, -3.0, -4.0)) == (1.0, 2.0, -3.0, -4.0)
+    assert worst_pole((-1.0, 2.0, -0.1, 4.0, 0.05, -5.0)) == (-1.0, 2.0, 0.1, 5.0)
+
+
+def test_an_unknown_task():
+    with pytest.raises(ConfigError, match="'nothing' is unknown; available: CartPole-v1"):
+        resolve("nothing")
+    assert resolve("CartPole-v1") is resolve(CARTPOLE_V1) is CARTPOLE_V1
+
+
+def test_a_name_is_taken_once(monkeypatch):
+    with pytest.raises(ConfigError, match="already"):
+        register_task(Task("CartPole-v1"))
+    assert register_task(CARTPOLE_V1) is CARTPOLE_V1
+    with pytest.raises(ConfigError, match="cannot be called 'no name'"):
+        register_task(Task("no name"))
+    assert "no name" not in TASKS

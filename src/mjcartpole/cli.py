@@ -6,6 +6,7 @@ needs them, so `--help` is quick.
 """
 
 import contextlib
+import dataclasses
 import io
 import json
 import logging
@@ -280,17 +281,7 @@ def _report_to_stderr() -> None:
 
 
 def _choice(command: Played) -> dict[str, Any]:
-    names = (
-        "backend",
-        "model",
-        "integrator",
-        "seed",
-        "set",
-        "own_timestep",
-        "allow_assets",
-        "task",
-    )
-    return {name: getattr(command, name) for name in names}
+    return {each.name: getattr(command, each.name) for each in dataclasses.fields(Played)}
 
 
 def parse(argv: Sequence[str]) -> Command:

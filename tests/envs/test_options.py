@@ -6,13 +6,15 @@ import numpy as np
 import pytest
 
 from mjcartpole.envs.cartpole import CartPoleEnv
-from mjcartpole.envs.options import reset_options
+from mjcartpole.envs.options import reset_options, usual
 from mjcartpole.errors import ConfigError
+from mjcartpole.task import CARTPOLE_V1
 
 
 def test_what_is_left_out_is_as_usual():
-    assert reset_options(None) == reset_options({}) == (-0.05, 0.05, ())
-    assert reset_options({"low": np.array(-0.2)}) == (-0.2, 0.05, ())
+    usually = usual(CARTPOLE_V1)
+    assert reset_options({}, usually) == usually == (-0.05, 0.05, ())
+    assert reset_options({"low": np.array(-0.2)}, usually) == (-0.2, 0.05, ())
 
 
 @pytest.mark.parametrize(

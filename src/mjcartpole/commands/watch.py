@@ -28,7 +28,7 @@ from mjcartpole.signals import Interrupted, StopSignals
 from mjcartpole.studies.evaluation import Evaluation, evaluate
 from mjcartpole.studies.film import Film, Frame, PolicySetup, VideoOptions, play
 from mjcartpole.studies.parity import Result, Subject, run_ladder
-from mjcartpole.task import TIME_LIMIT
+from mjcartpole.task import CARTPOLE_V1
 
 POLL: Final = 0.2
 """Seconds between two looks at the file."""
@@ -314,7 +314,7 @@ def _affordable(now: TrainResult) -> int:
     asked = now.config.episodes
     if now.seconds < _TRIAL:
         return asked
-    seconds_per_episode = now.seconds / now.steps * TIME_LIMIT
+    seconds_per_episode = now.seconds / now.steps * CARTPOLE_V1.time_limit
     left = asked - len(now.returns)
     if now.seconds + left * seconds_per_episode <= PATIENCE:
         return asked
@@ -323,7 +323,7 @@ def _affordable(now: TrainResult) -> int:
 
 def _count_evaluated(result: TrainResult) -> int:
     """How many greedy episodes there is time for, should all of them last to the time limit."""
-    seconds_per_episode = result.seconds / max(result.steps, 1) * TIME_LIMIT
+    seconds_per_episode = result.seconds / max(result.steps, 1) * CARTPOLE_V1.time_limit
     return max(_LEAST_EVALUATED, min(EVALUATED, int(EVALUATION_PATIENCE / seconds_per_episode)))
 
 

@@ -131,7 +131,7 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int], CartPo
     `kinematics_integrator`, and `total_mass` and `polemass_length`, which follow from these.
     Reading them says what the model has; setting one edits the model's document, with effect from
     the next reset. `x_threshold` and `theta_threshold_radians` hold from the next step; pictures
-    keep showing CartPole-v1's.
+    keep showing the task's.
 
     >>> env.unwrapped.state = (0.0, 0.0, 0.1, 0.0)
     >>> [round(float(value), 4) for value in env.step(1)[0]]
@@ -182,7 +182,7 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int], CartPo
         self._set_limits(self._task.x_limit, self._task.theta_limit)
         self.action_space = spaces.Discrete(N_ACTIONS)
         self.render_mode = render_mode
-        self._pictures = Pictures(cartpole, render_mode, width, height, camera)
+        self._pictures = Pictures(cartpole, render_mode, width, height, camera, self._task)
         self._advance: Callable[[float], State] = _needs_reset
         self._steps_after_end: list[int | None] = [None]
         self._left, self._right = cartpole.controls

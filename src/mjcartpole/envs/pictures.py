@@ -12,6 +12,7 @@ from mjcartpole.media.renderer import DEFAULT_HEIGHT, DEFAULT_WIDTH, Renderer, o
 from mjcartpole.media.scene import DEFAULT_CAMERA, check_picture
 from mjcartpole.media.window import Window, open_window
 from mjcartpole.physics.cartpole import CartPole
+from mjcartpole.task import Task
 
 RenderMode = Literal["human", "rgb_array"]
 
@@ -22,7 +23,13 @@ class Pictures:
     """Pictures of one size, from one camera. A copy opens a renderer of its own."""
 
     def __init__(
-        self, cartpole: CartPole, mode: RenderMode | None, width: int, height: int, camera: str
+        self,
+        cartpole: CartPole,
+        mode: RenderMode | None,
+        width: int,
+        height: int,
+        camera: str,
+        task: Task,
     ) -> None:
         """Check what was asked for; no OpenGL is touched.
 
@@ -33,7 +40,7 @@ class Pictures:
         _check_render_mode(mode, width, height)
         if mode == "rgb_array" or (width, height, camera) != _USUAL:
             check_picture(cartpole, width, height, camera)
-        self._width, self._height, self._camera = width, height, camera
+        self._width, self._height, self._camera, self._task = width, height, camera, task
         self._renderer: Renderer | None = None
         self._window: Window | None = None
 
@@ -41,7 +48,7 @@ class Pictures:
         """A picture of a state, shape (height, width, 3)."""
         # Held by a name of its own: another thread may close it meanwhile.
         renderer = self._renderer = self._renderer or open_renderer(
-            cartpole, width=self._width, height=self._height, camera=self._camera
+            cartpole, width=self._width, height=self._height, camera=self._camera, task=self._task
         )
         return renderer.render(state)
 

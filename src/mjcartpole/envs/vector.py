@@ -164,7 +164,7 @@ class CartPoleVectorEnv(
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self._prepare_episodes()
         self._open_renderer = functools.partial(
-            open_renderer, self.cartpole, width=width, height=height, camera=camera
+            open_renderer, self.cartpole, width=width, height=height, camera=camera, task=self._task
         )
         self._renderer: Renderer | None = None
 

@@ -20,7 +20,6 @@ from mjcartpole.task import (
     CARTPOLE_V1,
     Task,
     in_words,
-    observation_bound,
     state_names,
     task_named,
 )
@@ -40,7 +39,7 @@ _GRID: Final = ("bins", "low", "high")
 _DIMENSIONS: Final = len(state_names())
 
 # The article's ranges, as its code has them: the float32 bound of the angle, and 3.5 rad/s.
-_ARTICLE_THETA = float(observation_bound()[2])
+_ARTICLE_THETA = float(CARTPOLE_V1.observation_bound()[2])
 _ARTICLE: dict[str, Any] = {
     "episodes": 12_000,
     "bins": (1, 1, 25, 25),

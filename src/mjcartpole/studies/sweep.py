@@ -59,7 +59,7 @@ class SweepResult:
     values: tuple[float, ...]
     model: str
     played: TransferResult
-    threshold: float = CARTPOLE_V1.reward_threshold
+    threshold: float = CARTPOLE_V1.reward_threshold or 0.0
 
     def __repr__(self) -> str:
         span = f"{self.key} from {self.values[0]:g} to {self.values[-1]:g} on {self.model}"
