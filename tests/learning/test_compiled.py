@@ -217,9 +217,7 @@ def numbers(low, high):
             'mass="0.1"': numbers(0.05, 3),
             'pos="0 0 0.5"': numbers(0.05, 3).map("0 0.01 {}".format),
             'gear="10"': numbers(-30, -0.01) | numbers(0.01, 30),
-            'gravity="0 0 -9.8"': (numbers(-20, -0.5) | numbers(0.5, 1)).map(
-                "0.1 0 {}".format
-            ),
+            'gravity="0 0 -9.8"': (numbers(-20, -0.5) | numbers(0.5, 1)).map("0.1 0 {}".format),
             'damping="0"': st.just(0.0) | numbers(0, 2),
             'frictionloss="0"': st.just(0.0) | numbers(0, 0.5),
             'armature="0"': st.just(0.0) | numbers(0, 0.1),
