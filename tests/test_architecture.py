@@ -156,11 +156,13 @@ def test_public_names():
         "ManyResult",
         "Policy",
         "Simulation",
+        "Task",
         "TrainConfig",
         "TrainResult",
         "evaluate",
         "load_model",
         "model_names",
+        "register_task",
         "train",
         "train_many",
     ]
