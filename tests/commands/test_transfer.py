@@ -170,12 +170,20 @@ def test_a_table_is_never_replaced_unasked(policies, tmp_path, capsys):
     assert (mine / "transfer.csv").is_file()
 
 
-def test_no_plotting_library_is_needed(policies, tmp_path):
+def test_without_matplotlib_the_tables_are_written_and_a_line_says_how_to_get_the_plot(
+    policies, tmp_path
+):
     code = (
-        "import sys; from pathlib import Path; from mjcartpole.commands.transfer import *; "
-        f"run_transfer([Path({str(policies[0])!r})], models=['gym'], episodes=2); "
-        "print([name for name in ('matplotlib', 'dm_control', 'OpenGL') if name in sys.modules])"
+        "import sys; sys.modules['matplotlib'] = None; from pathlib import Path\n"
+        "from mjcartpole.commands.transfer import *\n"
+        f"code = run_transfer([Path({str(policies[0])!r})], models=['gym'], episodes=2)\n"
+        "print([name for name in ('dm_control', 'OpenGL') if name in sys.modules], code)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.splitlines()[-1] == "[]"
-    assert done.stderr == ""
+    *_, written, last = done.stdout.splitlines()
+    assert written == "written transfer/transfer.csv and .json"
+    assert last == "[] 0"
+    assert sorted(path.suffix for path in (tmp_path / "transfer").iterdir()) == [".csv", ".json"]
+    assert done.stderr.splitlines()[-1] == (
+        "mjcartpole: no .png: a plot needs the package matplotlib: pip install 'mjcartpole[plot]'"
+    )

@@ -6,16 +6,13 @@ import json
 import re
 import sys
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
-
-from PIL import Image
+from typing import TYPE_CHECKING, Any
 
 from mjcartpole.commands.evaluate import EvalTarget, learned_seeds, set_up
 from mjcartpole.errors import ConfigError
 from mjcartpole.files import (
-    atomic_write,
     check_free,
     check_writable,
     free_path,
@@ -25,13 +22,17 @@ from mjcartpole.files import (
 from mjcartpole.integrator import Integrator
 from mjcartpole.learning import runs
 from mjcartpole.learning.policy import Policy
+from mjcartpole.media import plots
 from mjcartpole.physics.load import Edits, model_names
 from mjcartpole.physics.simulation import silence_mujoco
 from mjcartpole.studies import multi_seed_runs
 from mjcartpole.studies.evaluation import EPISODES, SEED
-from mjcartpole.studies.heatmap import curves, heat_map
+from mjcartpole.studies.plots import curves, heat_map
 from mjcartpole.studies.sweep import SweepResult, parse_sweep, sweep
 from mjcartpole.studies.transfer import GYM, Cell, TransferResult, find_place, transfer
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 TRANSFER = Path("transfer")
 """Where the files go, unless told otherwise."""
@@ -95,7 +96,7 @@ def run_transfer(
         _print_matrix(matrix)
         _say_seeds(policies)
         rows = [cell.summary() for cell in matrix.cells]
-        _write(target, rows, matrix.summary(), heat_map(matrix))
+        _write(target, rows, matrix.summary(), lambda: heat_map(matrix))
         return _tell_failed(matrix)
     key, values = parse_sweep(swept)
     if len(models) > 1:
@@ -109,7 +110,7 @@ def run_transfer(
     _print_sweep(curve)
     _say_seeds(policies)
     summary = curve.summary()
-    _write(target, summary["points"], summary, curves(curve))
+    _write(target, summary["points"], summary, lambda: curves(curve))
     return _tell_failed(curve.played)
 
 
@@ -176,6 +177,8 @@ def _print_sweep(result: SweepResult) -> None:
     for column, value in enumerate(result.values):
         cells = (row[column] for row in result.played.rows)
         print(f"{value:{first}g}" + "".join(f"{_cell(cell):>{wide}}" for cell in cells))
+    if result.threshold is None:
+        return
     print()
     for name in result.played.policies:
         stretch = result.longest(name)
@@ -197,15 +200,18 @@ def _write(
     table: Path,
     rows: Sequence[Mapping[str, Any]],
     summary: Mapping[str, Any],
-    picture: Image.Image,
+    plot: Callable[[], "Figure"],
 ) -> None:
     _, as_json, drawn = (table.with_suffix(suffix) for suffix in SUFFIXES)
     write_whole(table, _csv(rows))
     text = json.dumps(summary, indent=2, allow_nan=False)
     write_whole(as_json, text + "\n")
-    with atomic_write(drawn) as temporary:
-        picture.save(temporary)
-    print(f"\nwritten {table}, {as_json.suffix} and {drawn.suffix}")
+    if plots.is_installed():
+        plots.write_plot(plot(), drawn)
+        print(f"\nwritten {table}, {as_json.suffix} and {drawn.suffix}")
+        return
+    print(f"\nwritten {table} and {as_json.suffix}")
+    print(f"mjcartpole: no {drawn.suffix}: {plots.MISSING_LIBRARY}", file=sys.stderr)
 
 
 def _csv(rows: Sequence[Mapping[str, Any]]) -> str:

@@ -16,7 +16,6 @@ from mjcartpole.physics.edit.edits import edits_of
 from mjcartpole.physics.load import Edits, ModelLike, load_model
 from mjcartpole.studies.evaluation import EPISODES, SEED, check_count
 from mjcartpole.studies.transfer import GYM, Cell, TransferResult, find_place, transfer
-from mjcartpole.task import CARTPOLE_V1
 
 MOST_VALUES: Final = 1_000
 
@@ -52,18 +51,21 @@ class SweepResult:
         values: Rising.
         model: Name of the model that was edited.
         played: Every policy (row) at every value (column).
-        threshold: A mean return from here up is no failure.
     """
 
     key: str
     values: tuple[float, ...]
     model: str
     played: TransferResult
-    threshold: float = CARTPOLE_V1.reward_threshold or 0.0
 
     def __repr__(self) -> str:
         span = f"{self.key} from {self.values[0]:g} to {self.values[-1]:g} on {self.model}"
         return f"SweepResult({span}, values: {len(self.values)}, {self.played!r})"
+
+    @property
+    def threshold(self) -> float | None:
+        """A mean return from here up is no failure; None where the task has none."""
+        return self.played.task.reward_threshold
 
     @property
     def means(self) -> npt.NDArray[np.float64]:
@@ -71,8 +73,9 @@ class SweepResult:
         return self.played.means
 
     def stretches(self, policy: str) -> list[Stretch]:
-        """Where a policy does not fail, from low to high."""
-        good = self.means[self.played.policies.index(policy)] >= self.threshold
+        """Where a policy does not fail, from low to high; nowhere if nothing is agreed."""
+        least = np.inf if self.threshold is None else self.threshold
+        good = self.means[self.played.policies.index(policy)] >= least
         edges = np.flatnonzero(np.diff(np.concatenate([[False], good, [False]])))
         last = len(self.values) - 1
         return [

@@ -17,6 +17,7 @@ from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.load import Edits, ModelLike, load_model
 from mjcartpole.studies.evaluation import EPISODES, SEED, Evaluation, check_count, evaluate
 from mjcartpole.studies.statistics import Interval, bootstrap_interval
+from mjcartpole.task import CARTPOLE_V1, Task
 
 GYM: Final = "gym"
 """The place that is gymnasium's own CartPole-v1, instead of a model."""
@@ -97,12 +98,14 @@ class TransferResult:
         places: Names, one per column.
         cells: Row by row.
         seed: Of the starting states, which are the same in every cell.
+        task: By whose rules they were played.
     """
 
     policies: tuple[str, ...]
     places: tuple[str, ...]
     cells: tuple[Cell, ...]
     seed: int
+    task: Task = CARTPOLE_V1
 
     def __repr__(self) -> str:
         counts = f"policies: {len(self.policies)}, models: {len(self.places)}"

@@ -1,0 +1,104 @@
+"""Plots: matplotlib without a window or global state, where it is installed."""
+
+import contextlib
+import importlib.util
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from mjcartpole.errors import RenderError
+from mjcartpole.files import atomic_write
+from mjcartpole.media.palette import CURVES, GRID, INK, LINE, PAPER, Colour
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+DATES: Final = {".png": {}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
+"""What each kind of file would say of the day, so that the same plot has the same bytes."""
+
+MISSING_LIBRARY: Final = "a plot needs the package matplotlib: pip install 'mjcartpole[plot]'"
+
+
+def is_installed() -> bool:
+    """Return whether matplotlib is there."""
+    return importlib.util.find_spec("matplotlib") is not None
+
+
+def check_installed() -> None:
+    """Refuse where matplotlib is missing.
+
+    Raises:
+        RenderError: See above.
+    """
+    if not is_installed():
+        raise RenderError(MISSING_LIBRARY)
+
+
+def css(colour: Colour) -> str:
+    """Return a colour of the palette as matplotlib, and a page, name it.
+
+    >>> css((255, 0, 16))
+    '#ff0010'
+    """
+    return "#" + bytes(colour).hex()
+
+
+def plain(text: str) -> str:
+    """Return a name as it is to be given to matplotlib: a dollar in it begins no formula.
+
+    What is no text in it, as a file's name may have, is shown as a question mark.
+    """
+    return text.encode("utf-8", "replace").decode().replace("$", r"\$")
+
+
+@contextlib.contextmanager
+def plot_style() -> Iterator[None]:
+    """Have what is plotted inside look the same everywhere, whatever a user's own settings are.
+
+    Raises:
+        RenderError: matplotlib is not installed.
+    """
+    check_installed()
+    import matplotlib.style  # noqa: PLC0415 - an optional package
+    from cycler import cycler  # noqa: PLC0415
+
+    ours: dict[str, Any] = {
+        **dict.fromkeys(("figure.facecolor", "axes.facecolor"), css(PAPER)),
+        **dict.fromkeys(("text.color", "axes.labelcolor"), css(INK)),
+        **dict.fromkeys(("xtick.labelcolor", "ytick.labelcolor"), css(INK)),
+        **dict.fromkeys(("axes.edgecolor", "xtick.color", "ytick.color"), css(LINE)),
+        **dict.fromkeys(("axes.spines.top", "axes.spines.right", "legend.frameon"), False),
+        **{"axes.grid": True, "grid.color": css(GRID), "axes.axisbelow": True},
+        **{"axes.prop_cycle": cycler(color=[css(colour) for colour in CURVES])},
+        **dict.fromkeys((f"figure.constrained_layout.{side}_pad" for side in "wh"), 0.12),
+        **{"axes.titlelocation": "left", "savefig.dpi": 100, "figure.dpi": 100},
+        # Ids in an SVG would be drawn by lot.
+        **{"axes.titlepad": 10, "svg.hashsalt": "mjcartpole"},
+    }
+    with matplotlib.style.context(["default", ours]), warnings.catch_warnings():
+        # A name may have letters that the font lacks.
+        warnings.filterwarnings("ignore", "Glyph .* missing from")
+        yield
+
+
+@plot_style()
+def write_plot(figure: "Figure", path: Path) -> None:
+    """Write a plot as its file's suffix says: PNG, SVG or PDF.
+
+    Of a figure without a layout of its own, what lies around its axes is part of the picture.
+
+    Raises:
+        RenderError: The suffix is another one, or matplotlib is not installed.
+        FileError: The file cannot be written.
+    """
+    suffix = path.suffix.lower()
+    if suffix not in DATES:
+        raise RenderError(
+            f"'{path}' is no plot's name; its suffix says what is written: {', '.join(DATES)}"
+        )
+    box = None if figure.get_layout_engine() else "tight"
+    with atomic_write(path) as temporary:
+        figure.savefig(
+            temporary, format=suffix[1:], bbox_inches=box, pad_inches=0.15, metadata=DATES[suffix]
+        )

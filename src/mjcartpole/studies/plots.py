@@ -1,0 +1,125 @@
+"""Plots of transfers and sweeps: a heat map, and curves."""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mjcartpole.media.palette import FAINT, INK, MISSING, PAPER
+from mjcartpole.media.plots import css, plain, plot_style
+from mjcartpole.studies.sweep import SweepResult
+from mjcartpole.studies.transfer import Cell, TransferResult
+from mjcartpole.task import one_per_step
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+CELL = 0.96, 0.52
+"""Width and height of a cell, inches."""
+
+
+@plot_style()
+def heat_map(result: TransferResult) -> "Figure":
+    """Plot every policy (row) on every model (column): colour and number are the mean return.
+
+    Raises:
+        RenderError: matplotlib is not installed.
+    """
+    from matplotlib import colormaps  # noqa: PLC0415 - an optional package
+    from matplotlib.figure import Figure  # noqa: PLC0415
+
+    rows, columns = result.means.shape
+    figure = Figure(figsize=(CELL[0] * columns, CELL[1] * rows))
+    axes = figure.add_axes((0, 0, 1, 1))
+    low, high = _span(result)
+    colours = colormaps["viridis"].with_extremes(bad=css(MISSING))
+    image = axes.imshow(result.means, colours, aspect="auto", vmin=low, vmax=high)
+    axes.grid(visible=False)
+    axes.set_xticks(np.arange(columns + 1) - 0.5, minor=True)
+    axes.set_yticks(np.arange(rows + 1) - 0.5, minor=True)
+    axes.grid(which="minor", color=css(PAPER), linewidth=2)
+    for y, cells in enumerate(result.rows):
+        for x, cell in enumerate(cells):
+            _letter(axes, (x, y), cell, image.to_rgba(np.array(cell.mean)))
+    names = [_short(name, 40) for name in result.places]
+    axes.set_xticks(range(columns), names, rotation=45, ha="left", rotation_mode="anchor")
+    axes.set_yticks(range(rows), [_short(name, 34) for name in result.policies])
+    axes.tick_params(which="both", length=0, labeltop=True, labelbottom=False)
+    axes.spines[:].set_visible(False)
+    episodes = max(len(cell.evaluation.episodes) if cell.evaluation else 0 for cell in result.cells)
+    axes.set_xlabel(f"mean greedy return of {episodes} episodes\nbelow: 95 % interval")
+    return figure
+
+
+@plot_style()
+def curves(result: SweepResult) -> "Figure":
+    """Plot the mean return of every policy against the parameter, with 95 % bands.
+
+    Where the simulation diverged there is a gap.
+
+    Raises:
+        RenderError: matplotlib is not installed.
+    """
+    from matplotlib.figure import Figure  # noqa: PLC0415 - an optional package
+
+    policies = result.played.policies
+    figure = Figure(figsize=(8.6, 5 + 0.24 * len(policies)), layout="constrained")
+    axes = figure.add_subplot()
+    for cells in result.played.rows:
+        bands = [cell.interval or (np.nan, np.nan) for cell in cells]
+        axes.fill_between(result.values, *np.transpose(bands), alpha=0.2, linewidth=0)
+        axes.plot(result.values, [cell.mean for cell in cells], "o-", markersize=5, clip_on=False)
+    axes.set(xlabel=plain(result.key), title=f"mean greedy return on {_short(result.model, 50)}")
+    axes.set_ylim(*_span(result.played))
+    axes.margins(x=0)
+    if result.threshold is not None:
+        _mark_level(axes, result.threshold)
+    legend = figure.legend(axes.lines[: len(policies)], policies, loc="outside lower left")
+    for text, name in zip(legend.get_texts(), policies, strict=True):
+        # Set here: a label that begins with an underscore would be left out.
+        text.set_text(_short(name, 40) + _in_words(result, name))
+    return figure
+
+
+def _span(result: TransferResult) -> tuple[float, float] | tuple[None, None]:
+    """Return what a return lies between: known of a step's 1, else left to what was found."""
+    task = result.task
+    return (0, task.time_limit) if task.reward is one_per_step else (None, None)
+
+
+def _mark_level(axes: "Axes", y: float) -> None:
+    """Draw a return right across, with its number."""
+    axes.axhline(y, color=css(FAINT), linewidth=1)
+    text = axes.annotate(f"{y:g}", (1, y), (0, -3), axes.get_yaxis_transform(), "offset points")
+    text.set(color=css(FAINT), ha="right", va="top")
+
+
+def _in_words(result: SweepResult, policy: str) -> str:
+    if result.threshold is None:
+        return ""
+    stretch = result.longest(policy)
+    return f": holds from {stretch}" if stretch else f": nowhere at {result.threshold:g}"
+
+
+def _letter(axes: "Axes", place: tuple[int, int], cell: Cell, colour: Any) -> None:  # noqa: ANN401
+    """Write a cell's mean and interval, in the ink that is seen on its colour."""
+    x, y = place
+    lightness = float(np.dot(colour[:3], (0.299, 0.587, 0.114)))
+    style: dict[str, Any] = {
+        "color": css(INK if lightness > 0.55 else PAPER),
+        "ha": "center",
+        "va": "center",
+    }
+    if cell.interval is None:
+        axes.text(x, y, "failed", **style)
+        return
+    axes.text(x, y - 0.12, f"{cell.mean:.1f}", fontsize=12, **style)
+    axes.text(
+        x, y + 0.25, f"{cell.interval.low:.0f} to {cell.interval.high:.0f}", fontsize=8, **style
+    )
+
+
+def _short(text: str, most: int) -> str:
+    """Return a name, without its middle if it is long."""
+    cut = len(text) > most
+    return plain(f"{text[: most // 2]}...{text[len(text) - most // 2 + 3 :]}" if cut else text)
