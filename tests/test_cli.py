@@ -62,15 +62,23 @@ def run(here, capsys):
 def test_flags_are_the_fields_of_the_config():
     command = cli.parse(["train", "--gamma", "0.9", "--bins", "1", "1", "2", "3", "--seed=4"])
     assert command.config == TrainConfig(gamma=0.9, bins=(1, 1, 2, 3), seed=4)
-    assert command.preset == "tuned"
-    assert command.video is True
+    assert command.where.preset == "tuned"
+    assert command.how.video is True
 
 
 @pytest.mark.parametrize("form", [["--preset", "article"], ["--preset=article"]])
 def test_a_preset_changes_the_defaults(form):
     command = cli.parse(["train", "--backend", "gym", *form, "--episodes", "50"])
     assert command.config == TrainConfig.preset("article", backend="gym", episodes=50)
-    assert command.preset == "article"
+    assert command.where.preset == "article"
+
+
+@pytest.mark.parametrize("form", [["--method", "sarsa"], ["--method=sarsa"]])
+def test_a_method_has_flags_of_its_own(form, capsys):
+    command = cli.parse(["train", *form, "--epsilon", "0.5"])
+    assert command.config == TrainConfig(method="sarsa", epsilon=0.5)
+    assert "--td-lambda" not in call(["train", *form, "--help"], capsys)[1]
+    assert "--td-lambda" in call(["train", "--help"], capsys)[1]
 
 
 @pytest.mark.parametrize(
@@ -229,6 +237,9 @@ def test_training_films_its_first_evaluation_episode(here, capsys):
 
 BAD = [
     (["train", "--preset", "best"], "preset 'best' is unknown; available: tuned"),
+    (["train", "--task", "juggle"], "task 'juggle' is unknown; available: CartPole-v1"),
+    (["train", "--method", "guess"], "method 'guess' is unknown; available: q-learning, sarsa"),
+    (["train", "--method", "sarsa", "--td-lambda", "0.5"], "--td-lambda"),
     (["train", "--episodes", "0"], "episodes must be a whole number from 1 up, not 0"),
     (["train", "--episodes", "-7"], "not -7"),
     (["train", "--episodes", "many"], "many"),
@@ -256,6 +267,8 @@ BAD = [
     (["train", "--resume", "full"], "'full' holds no training that could be continued"),
     (["train", "--resume", "a-file"], "holds no training that could be continued"),
     (["train", "--resume", "RUN", "--seed", "9"], "leave out --seed"),
+    (["train", "--resume", "RUN", "--method", "sarsa"], "leave out --method"),
+    (["train", "--resume", "RUN", "--seeds", "2", "--overwrite"], "leave out --overwrite, --seeds"),
     (["train", "--overwriet"], "perhaps you meant --overwrite"),
     (["fly"], "fly"),
     (["evaluate"], "RUN-OR-POLICY"),

@@ -22,8 +22,9 @@ from mjcartpole.learning.training import Training, train
 from mjcartpole.physics.load import load_model
 from mjcartpole.physics.simulation import Simulation
 from mjcartpole.studies.evaluation import evaluate
-from mjcartpole.studies.film import Film, PolicySetup, VideoOptions, play
+from mjcartpole.studies.film import Film, PolicySetup, play
 from mjcartpole.studies.transfer import transfer
+from mjcartpole.studies.video_options import VideoOptions
 from mjcartpole.task import CARTPOLE_V1
 
 CHAIN = str(Path(__file__).parent / "models" / "chain.xml")
@@ -339,7 +340,7 @@ def test_a_film_shows_both_poles_and_their_numbers(model):
     policy = train(TrainConfig(model=model, episodes=5)).policy
     take = play(PolicySetup("it", policy, model=model))[0]
     assert take.states.shape == (take.episode.steps + 1, 6)
-    look = VideoOptions(width=320, height=240, overlay=True, quality="draft")
+    look = VideoOptions(size="320x240", overlay=True, quality="draft")
     with Film([[take]], look) as film:
         frames = [frame.copy() for frame in film.frames()]
     assert len(frames) == len(take.states)

@@ -16,7 +16,8 @@ import pytest
 from PIL import Image
 
 from mjcartpole import cli
-from mjcartpole.commands.evaluate import EvalTarget, set_up
+from mjcartpole.commands.options import EvalTarget
+from mjcartpole.commands.policies import set_up
 from mjcartpole.studies.film import play
 
 SMALL = ["--size", "160x120", "--quality", "draft"]

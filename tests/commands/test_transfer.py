@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from mjcartpole.commands.transfer import run_transfer
+from mjcartpole.commands.transfer import Transfer
 from mjcartpole.errors import ConfigError, FileError, MjCartPoleError, RunError
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.runs import begin_run, write_results
@@ -40,7 +40,7 @@ def read_csv(path):
 
 def test_a_matrix_is_printed_and_written(policies, tmp_path, capsys):
     models = ["gym", "cartpole", "long"]
-    assert run_transfer(policies[:2], models=models, episodes=10, output=tmp_path / "out") == 0
+    assert Transfer(policies[:2], models=models, episodes=10, output=tmp_path / "out").run() == 0
     printed = capsys.readouterr().out.splitlines()
     assert printed[2].split() == ["policy-0", "policy-1"]
     assert [line.split()[0] for line in printed[3:6]] == models
@@ -63,25 +63,27 @@ def test_a_matrix_is_printed_and_written(policies, tmp_path, capsys):
 
 def test_the_same_seed_writes_the_same_bytes(policies, tmp_path):
     for name in ("a", "b"):
-        run_transfer(policies[:1], models=["cartpole", "gym"], episodes=10, output=tmp_path / name)
+        Transfer(
+            policies[:1], models=["cartpole", "gym"], episodes=10, output=tmp_path / name
+        ).run()
     for path in (tmp_path / "a").iterdir():
         assert path.read_bytes() == (tmp_path / "b" / path.name).read_bytes()
 
 
 def test_edits_are_in_the_names(policies, tmp_path, capsys):
-    run_transfer(
+    Transfer(
         policies[:1],
         models=["cartpole", "gym"],
-        edits=("pole.length=1.5",),
+        set=("pole.length=1.5",),
         episodes=2,
         output=tmp_path / "out",
-    )
+    ).run()
     assert "cartpole with pole.length=1.5" in capsys.readouterr().out
 
 
 def test_a_sweep_is_printed_and_written(policies, tmp_path, capsys):
-    swept = "joint:hinge.damping=0:1:0.5"
-    assert run_transfer(policies[:2], swept=swept, episodes=10, output=tmp_path) == 0
+    sweep = "joint:hinge.damping=0:1:0.5"
+    assert Transfer(policies[:2], sweep=sweep, episodes=10, output=tmp_path).run() == 0
     printed = capsys.readouterr().out
     assert "policy-0: the mean return is" in printed
     rows = read_csv(tmp_path / "sweep-joint-hinge.damping.csv")
@@ -98,7 +100,7 @@ def test_a_run_is_swept_on_its_own_model(policies, tmp_path, trained):
     config = TrainConfig.preset("tuned", model="long", episodes=5)
     begin_run(folder, config, load_model("long"), preset="tuned")
     write_results(folder, train(config), {})
-    run_transfer([folder], swept="gravity=9:10:1", episodes=2, output=tmp_path)
+    Transfer([folder], sweep="gravity=9:10:1", episodes=2, output=tmp_path).run()
     document = json.loads((tmp_path / "sweep-gravity.json").read_text())
     assert document["model"] == str(folder / "model.xml")
     assert document["points"][0]["policy"] == "mine"
@@ -108,7 +110,7 @@ def test_policies_of_one_name_are_told_apart(policies, tmp_path):
     other = tmp_path / "other" / "policy-0.json"
     other.parent.mkdir()
     other.write_bytes(policies[1].read_bytes())
-    run_transfer([policies[0], other], models=["cartpole"], episodes=2, output=tmp_path)
+    Transfer([policies[0], other], models=["cartpole"], episodes=2, output=tmp_path).run()
     document = json.loads((tmp_path / "transfer.json").read_text())
     assert document["policies"] == [str(policies[0]), str(other)]
 
@@ -117,7 +119,7 @@ def test_four_policies_on_six_models_take_less_than_a_minute(policies, tmp_path)
     # Untrained policies would end their episodes early; these 24 cells are the slowest there are.
     started = time.perf_counter()
     models = ["gym", "cartpole", "long", "short", "heavy", "damped"]
-    run_transfer(policies, models=models, output=tmp_path)
+    Transfer(policies, models=models, output=tmp_path).run()
     assert time.perf_counter() - started < 60
     assert len(read_csv(tmp_path / "transfer.csv")) == 24
 
@@ -126,47 +128,47 @@ def test_four_policies_on_six_models_take_less_than_a_minute(policies, tmp_path)
     ("settings", "error", "match"),
     [
         ({"models": ["cartpole", "nothing.xml"]}, MjCartPoleError, "nothing.xml"),
-        ({"edits": {"pole.lenght": 1.0}}, ConfigError, "pole.length"),
-        ({"models": ["a", "b"], "swept": "gravity=1:2:1"}, ConfigError, "one model"),
-        ({"models": ["gym"], "swept": "gravity=1:2:1"}, ConfigError, "cannot be swept"),
-        ({"swept": "gravity"}, ConfigError, "no sweep"),
+        ({"set": ("pole.lenght=1",)}, ConfigError, "pole.length"),
+        ({"models": ["a", "b"], "sweep": "gravity=1:2:1"}, ConfigError, "one model"),
+        ({"models": ["gym"], "sweep": "gravity=1:2:1"}, ConfigError, "cannot be swept"),
+        ({"sweep": "gravity"}, ConfigError, "no sweep"),
         ({"episodes": 0, "models": ["cartpole"]}, ConfigError, "episodes"),
     ],
 )
 def test_mistakes_leave_nothing_behind(policies, tmp_path, settings, error, match):
     with pytest.raises(error, match=match) as caught:
-        run_transfer(policies[:1], output=tmp_path / "out", **settings)
+        Transfer(policies[:1], output=tmp_path / "out", **settings).run()
     assert "\n" not in str(caught.value)
     assert not list(tmp_path.glob("out/*"))
 
 
 def test_mistakes_in_the_sources(tmp_path, policies):
     with pytest.raises(ConfigError, match="RUN-OR-POLICY"):
-        run_transfer([])
+        Transfer([]).run()
     with pytest.raises(RunError, match="no run folder or policy file"):
-        run_transfer([tmp_path / "nowhere"])
+        Transfer([tmp_path / "nowhere"]).run()
     (tmp_path / "taken").write_text("")
     with pytest.raises(FileError, match="taken"):
-        run_transfer(policies[:1], models=["cartpole"], output=tmp_path / "taken")
+        Transfer(policies[:1], models=["cartpole"], output=tmp_path / "taken").run()
 
 
 def test_a_table_is_never_replaced_unasked(policies, tmp_path, capsys):
     for _ in range(2):
-        run_transfer(policies[:1], models=["gym"], episodes=2)
-        run_transfer(policies[:1], swept="gravity=9:10:1", episodes=2)
+        Transfer(policies[:1], models=["gym"], episodes=2).run()
+        Transfer(policies[:1], sweep="gravity=9:10:1", episodes=2).run()
     out = capsys.readouterr().out
     names = ["sweep-gravity", "sweep-gravity-2", "transfer", "transfer-2"]
     assert sorted({path.stem for path in (tmp_path / "transfer").iterdir()}) == names
     for name in names:
         assert f"written transfer/{name}.csv, .json and .png" in out
     mine = tmp_path / "mine"
-    run_transfer(policies[:1], models=["gym"], episodes=2, output=mine)
+    Transfer(policies[:1], models=["gym"], episodes=2, output=mine).run()
     (mine / "transfer.csv").unlink()
     before = {path: path.read_bytes() for path in mine.iterdir()}
     with pytest.raises(FileError, match=r"transfer\.json' exists.*--overwrite"):
-        run_transfer(policies[:1], models=["gym"], episodes=3, output=mine)
+        Transfer(policies[:1], models=["gym"], episodes=3, output=mine).run()
     assert {path: path.read_bytes() for path in mine.iterdir()} == before
-    run_transfer(policies[:1], models=["gym"], episodes=3, output=mine, overwrite=True)
+    Transfer(policies[:1], models=["gym"], episodes=3, output=mine, overwrite=True).run()
     assert (mine / "transfer.csv").is_file()
 
 
@@ -175,8 +177,8 @@ def test_without_matplotlib_the_tables_are_written_and_a_line_says_how_to_get_th
 ):
     code = (
         "import sys; sys.modules['matplotlib'] = None; from pathlib import Path\n"
-        "from mjcartpole.commands.transfer import *\n"
-        f"code = run_transfer([Path({str(policies[0])!r})], models=['gym'], episodes=2)\n"
+        "from mjcartpole.commands.transfer import Transfer\n"
+        f"code = Transfer([Path({str(policies[0])!r})], models=['gym'], episodes=2).run()\n"
         "print([name for name in ('dm_control', 'OpenGL') if name in sys.modules], code)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

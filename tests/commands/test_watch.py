@@ -14,7 +14,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from mjcartpole.commands.watch import Watched, _affordable, _SavedAgainError, run_watch
+from mjcartpole.commands.watch import Watch
+from mjcartpole.commands.watch_work import affordable
+from mjcartpole.commands.watched_file import SavedAgainError, Watched
 from mjcartpole.errors import ConfigError, ModelNotFoundError
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.episodes import Episode, EpisodeLog
@@ -32,9 +34,9 @@ SUFFIX = ".mp4" if find_ffmpeg() else ".gif"
 SCRIPT = """
 import sys
 from pathlib import Path
-from mjcartpole.commands.watch import run_watch
+from mjcartpole.commands.watch import Watch
 try:
-    sys.exit(run_watch(Path(sys.argv[1]), episodes=int(sys.argv[2]), video=sys.argv[3] == "1"))
+    sys.exit(Watch(Path(sys.argv[1]), episodes=int(sys.argv[2]), video=sys.argv[3] == "1").run())
 except KeyboardInterrupt as stop:
     print(stop, file=sys.stderr)
     sys.exit(stop.exit_code)
@@ -109,7 +111,7 @@ def replace(path, text):
 
 
 def test_one_look(file, capsys):
-    assert run_watch(file, once=1, episodes=200) == 0
+    assert Watch(file, once=1, episodes=200).run() == 0
     words = [line.split()[0] for line in capsys.readouterr().out.splitlines() if line]
     expected = ["sketch", "parity", "training", "greedy", "video", "done"]
     assert [word for word in words if word in expected] == expected
@@ -120,10 +122,10 @@ def test_one_look(file, capsys):
 
 
 def test_parity_holds_for_the_reference_and_is_beyond_for_the_rest(file, capsys):
-    run_watch(file, once=1, episodes=5, video=False)
+    Watch(file, once=1, episodes=5, video=False).run()
     assert "parity    as the equations say (rung 2, 3, 4)" in capsys.readouterr().out
     file.write_text(REFERENCE.replace('name="hinge"', 'name="hinge" stiffness="1"'))
-    run_watch(file, once=1, episodes=5, video=False)
+    Watch(file, once=1, episodes=5, video=False).run()
     assert "beyond the equations" in capsys.readouterr().out
 
 
@@ -206,10 +208,10 @@ def test_a_slow_training_is_cut_short():
             log.append(Episode(number, 500.0, 500, "time limit"))
         return TrainResult(config, policy, log, seconds)
 
-    assert _affordable(at(0.1, 1)) == 1000  # Too soon to tell.
-    assert _affordable(at(0.7, 300)) == 1000
-    assert _affordable(at(1.0, 50)) == 300
-    assert _affordable(at(60.0, 2)) == 20
+    assert affordable(at(0.1, 1)) == 1000  # Too soon to tell.
+    assert affordable(at(0.7, 300)) == 1000
+    assert affordable(at(1.0, 50)) == 300
+    assert affordable(at(60.0, 2)) == 20
 
 
 class TestWatched:
@@ -232,7 +234,7 @@ class TestWatched:
     def test_written(self, watched, file):
         file.write_text(LIGHT)
         assert watched.has_changed()
-        with pytest.raises(_SavedAgainError):
+        with pytest.raises(SavedAgainError):
             watched.check()
         watched.take()
         assert not watched.has_changed()
@@ -292,12 +294,12 @@ class TestWatched:
 
 def test_mistakes_are_told_at_once(file):
     with pytest.raises(ModelNotFoundError):
-        run_watch(file.with_name("nothing.xml"))
+        Watch(file.with_name("nothing.xml")).run()
     with pytest.raises(ConfigError, match="preset"):
-        run_watch(file, preset="tnued")
+        Watch(file, preset="tnued").run()
     with pytest.raises(ConfigError, match="once"):
-        run_watch(file, once=0)
+        Watch(file, once=0).run()
     with pytest.raises(ConfigError, match="episodes"):
-        run_watch(file, episodes=0)
+        Watch(file, episodes=0).run()
     with pytest.raises(ConfigError, match="integrator"):
-        run_watch(file, integrator="rk4")
+        Watch(file, integrator="rk4").run()

@@ -17,19 +17,12 @@ from mjcartpole.media.overlay import Overlay
 from mjcartpole.media.renderer import open_renderer
 from mjcartpole.physics.load import load_model
 from mjcartpole.studies.evaluation import SEED, evaluate
-from mjcartpole.studies.film import (
-    FALL_SECONDS,
-    FALL_SPEED,
-    Film,
-    PolicySetup,
-    Rollout,
-    VideoOptions,
-    play,
-)
+from mjcartpole.studies.film import Film, PolicySetup, Rollout, play
+from mjcartpole.studies.video_options import FALL_SECONDS, FALL_SPEED, VideoOptions
 from mjcartpole.task import CONTROL_STEP
 
 WIDTH, HEIGHT = 160, 120
-SMALL = {"width": WIDTH, "height": HEIGHT, "quality": "draft"}
+SMALL = {"size": f"{WIDTH}x{HEIGHT}", "quality": "draft"}
 BACKENDS = pytest.mark.parametrize("backend", ["mujoco", "gym"])
 
 
@@ -64,7 +57,7 @@ def drawn(casts, **look):
 
 @pytest.fixture(scope="module")
 def renderer():
-    with open_renderer(load_model(), **SMALL) as renderer:
+    with open_renderer(load_model(), width=WIDTH, height=HEIGHT, quality="draft") as renderer:
         yield renderer
 
 
@@ -182,7 +175,7 @@ def test_what_gymnasium_moves_is_drawn_with_our_model(renderer):
 
 
 def test_an_overlay_shows_the_moment_of_each_frame(take):
-    look = {"width": 320, "height": 240, "overlay": True, "speed": 0.5}
+    look = {"size": "320x240", "overlay": True, "speed": 0.5}
     frames = drawn([[take]], **look)
     with open_renderer(load_model(), width=320, height=240, quality="draft") as renderer:
         overlay = Overlay(renderer.scene)
@@ -245,8 +238,8 @@ def test_a_contact_sheet_of_few_frames_shows_each_once(take):
     ("look", "message"),
     [
         ({"camera": "moon"}, "no camera 'moon'; available: side, follow"),
-        ({"width": 15}, "width 15 is no size of a picture"),
-        ({"height": 100_000}, "height 100000 is no size of a picture"),
+        ({"size": "15x480"}, "width 15 is no size of a picture"),
+        ({"size": "640X100000"}, "height 100000 is no size of a picture"),
         ({"fps": 0}, "fps 0 makes no sense; use 1 to 1000"),
         ({"fps": 1e-9}, "fps 1e-09 makes no sense"),
         ({"fps": float("nan")}, "fps nan makes no sense"),
@@ -278,7 +271,8 @@ LONG = """
     import numpy as np
     sys.path.insert(0, sys.argv[1])
     from test_film import SMALL, some_policy
-    from mjcartpole.studies.film import Film, PolicySetup, VideoOptions, play
+    from mjcartpole.studies.film import Film, PolicySetup, play
+    from mjcartpole.studies.video_options import VideoOptions
     from mjcartpole.media.video import write_video
 
     def write(speed):

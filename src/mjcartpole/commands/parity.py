@@ -1,82 +1,102 @@
-"""What `mjcartpole parity` does and prints."""
+"""`mjcartpole parity`."""
 
 import dataclasses
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, Literal
 
-from rich.console import Console
-
+from mjcartpole.commands.options import Command
 from mjcartpole.files import check_writable, make_folder, write_whole
-from mjcartpole.learning.runs import versions
-from mjcartpole.physics.load import load_model
-from mjcartpole.physics.simulation import silence_mujoco
-from mjcartpole.studies.parity import Against, Figure, Result, Subject, run_ladder
-from mjcartpole.studies.parity.ladder import check_rungs
 
-QUESTIONS: dict[Against, str] = {
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from mjcartpole.studies.parity import Figure, Result, Subject
+
+QUESTIONS = {
     "cartpole-v1": "Is {} CartPole-v1?",
     "itself": "Does MuJoCo move {} as the equations with its own parameters do?",
 }
-MOVES: dict[Against, str] = {
-    "cartpole-v1": "CartPole-v1",
-    "itself": "its own equations say",
-}
+MOVES = {"cartpole-v1": "CartPole-v1", "itself": "its own equations say"}
 VERDICTS = {"holds": "holds", "fails": "FAILS", "beyond": "BEYOND", "skipped": "skipped"}
 
 
-def run_parity(
-    model: str,
-    edits: Sequence[str] = (),
-    *,
-    against: Against,
-    rungs: Sequence[int],
-    quick: bool,
-    strict: bool = False,
-    output: Path | None,
-) -> int:
-    """Climb the ladder and print each rung as it is found.
+@dataclass(frozen=True)
+class Parity(Command):
+    """Hold MuJoCo against CartPole-v1, rung by rung."""
 
-    Returns:
-        0 where the motion holds (with `strict`, where no number differs either), else 1.
-    """
-    silence_mujoco()
-    check_rungs(rungs)
-    cartpole = load_model(model, edits, own_timestep=True)
-    subject = Subject(cartpole, against, quick)
-    # A model whose parameters cannot be read is the user's mistake: better known before any work.
-    _ = subject.numbers
-    if output:
-        check_writable(make_folder(output.parent))
-    print(QUESTIONS[against].format(cartpole.name) + (" (quick)" if quick else ""))
-    if subject.region.bounds:
-        print(f"  asked where it moves freely; outside: {'; '.join(subject.region.bounds)}")
-    if subject.solves_to_the_end:
-        print("  dry friction is solved to the end, not to the file's solver tolerance")
-    results: list[Result] = []
-    console, ladder = Console(stderr=True), run_ladder(subject, rungs)
-    # While it is shown, the status takes stdout over: nothing may be printed then.
-    while (result := _next_result(console, ladder)) is not None:
-        results.append(result)
-        _print_result(result)
-    holds = all(result.verdict in {"holds", "skipped"} for result in results)
-    _print_motion(subject, results, holds)
-    _print_numbers(subject, holds)
-    if output:
-        write_whole(
-            output, json.dumps(_report(subject, results, holds), indent=2, allow_nan=False) + "\n"
-        )
-        print(f"\nreport {output}")
-    return 0 if holds and not (strict and subject.numbers) else 1
+    model: str = "cartpole"
+    """A shipped model's name or an MJCF file."""
+    set: tuple[str, ...] = ()
+    """Edits of the model, such as pole.length=1.5 or joint:hinge.damping=0.1."""
+    against: Literal["cartpole-v1", "itself"] = "cartpole-v1"
+    """cartpole-v1: is this model CartPole-v1? itself: does MuJoCo move it as its equations do?"""
+    rungs: tuple[int, ...] = tuple(range(1, 11))
+    """Which rungs of the ladder."""
+    quick: bool = False
+    """Fewer samples."""
+    strict: bool = False
+    """Exit with 1 also where the motion holds and the model's numbers are not CartPole-v1's."""
+    json: Path | None = None
+    """Write every figure to this file."""
+
+    def run(self) -> int:
+        """Climb the ladder and print each rung as it is found.
+
+        Returns:
+            0 where the motion holds (with `strict`, where no number differs either), else 1.
+        """
+        from mjcartpole.physics.load import load_model
+        from mjcartpole.physics.simulation import silence_mujoco
+        from mjcartpole.studies.parity import Subject
+        from mjcartpole.studies.parity.ladder import check_rungs
+
+        silence_mujoco()
+        check_rungs(self.rungs)
+        cartpole = load_model(self.model, self.set, own_timestep=True)
+        subject = Subject(cartpole, self.against, self.quick)
+        # A model whose parameters cannot be read is the user's mistake: better known before work.
+        _ = subject.numbers
+        if self.json:
+            check_writable(make_folder(self.json.parent))
+        results = self._climb(subject)
+        holds = all(result.verdict in {"holds", "skipped"} for result in results)
+        _print_motion(subject, results, holds)
+        _print_numbers(subject, holds)
+        if self.json:
+            report = json.dumps(_report(subject, results, holds), indent=2, allow_nan=False)
+            write_whole(self.json, report + "\n")
+            print(f"\nreport {self.json}")
+        return 0 if holds and not (self.strict and subject.numbers) else 1
+
+    def _climb(self, subject: "Subject") -> "list[Result]":
+        from rich.console import Console
+
+        from mjcartpole.studies.parity import run_ladder
+
+        question = QUESTIONS[self.against].format(subject.cartpole.name)
+        print(question + (" (quick)" if self.quick else ""))
+        if subject.region.bounds:
+            print(f"  asked where it moves freely; outside: {'; '.join(subject.region.bounds)}")
+        if subject.solves_to_the_end:
+            print("  dry friction is solved to the end, not to the file's solver tolerance")
+        results: list[Result] = []
+        console, ladder = Console(stderr=True), run_ladder(subject, self.rungs)
+        # While it is shown, the status takes stdout over: nothing may be printed then.
+        while (result := _next_result(console, ladder)) is not None:
+            results.append(result)
+            _print_result(result)
+        return results
 
 
-def _next_result(console: Console, ladder: Iterator[Result]) -> Result | None:
+def _next_result(console: "Console", ladder: "Iterator[Result]") -> "Result | None":
     with console.status("climbing …"):
         return next(ladder, None)
 
 
-def _print_result(result: Result) -> None:
+def _print_result(result: "Result") -> None:
     print(f"\n{result.rung:2d}  {VERDICTS[result.verdict]:8s} {result.title}")
     if result.skipped:
         print(f"     {result.skipped}")
@@ -93,8 +113,8 @@ def _number(value: float) -> str:
     return f"{value:.0f}" if whole else f"{value:.4g}"
 
 
-def _bound(figure: Figure) -> str:
-    """The bound in words; a figure without one is only reported."""
+def _bound(figure: "Figure") -> str:
+    """Return the bound in words; a figure without one is only reported."""
     if figure.bound is None:
         return figure.unit
     relation = "≥" if figure.at_least else "≤"
@@ -102,7 +122,7 @@ def _bound(figure: Figure) -> str:
     return f"{relation} {_number(figure.bound)} {figure.unit}".rstrip() + mark
 
 
-def _print_motion(subject: Subject, results: list[Result], holds: bool) -> None:
+def _print_motion(subject: "Subject", results: "list[Result]", holds: bool) -> None:
     failed = [str(r.rung) for r in results if r.verdict in {"fails", "beyond"}]
     skipped = [str(r.rung) for r in results if r.verdict == "skipped"]
     ending = f"; skipped: {', '.join(skipped)}" if skipped else ""
@@ -117,8 +137,8 @@ def _print_motion(subject: Subject, results: list[Result], holds: bool) -> None:
         print(f"  {cause}")
 
 
-def _print_numbers(subject: Subject, holds: bool) -> None:
-    """Whether the document's numbers are CartPole-v1's, whatever the motion."""
+def _print_numbers(subject: "Subject", holds: bool) -> None:
+    """Say whether the document's numbers are CartPole-v1's, whatever the motion."""
     if subject.against == "itself":
         print("numbers  its own, as the compiled model has them")
     elif not subject.numbers:
@@ -130,7 +150,9 @@ def _print_numbers(subject: Subject, holds: bool) -> None:
             print(f"  {phrase}")
 
 
-def _report(subject: Subject, results: list[Result], holds: bool) -> dict[str, Any]:
+def _report(subject: "Subject", results: "list[Result]", holds: bool) -> dict[str, Any]:
+    from mjcartpole.learning.runs import versions
+
     return {
         "model": subject.cartpole.name,
         "against": subject.against,

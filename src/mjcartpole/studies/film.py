@@ -11,39 +11,19 @@ import numpy as np
 import numpy.typing as npt
 
 from mjcartpole.envs.backend import Backend, make_env
-from mjcartpole.errors import RenderError
 from mjcartpole.integrator import Integrator
 from mjcartpole.learning.episodes import ENDINGS, Episode
 from mjcartpole.learning.loop import play_episode
 from mjcartpole.learning.policy import Policy
 from mjcartpole.media.hud import Moment
-from mjcartpole.media.montage import (
-    equally_spaced,
-    last_seconds,
-    played,
-    sheet,
-    side_by_side,
-    state_at,
-    time_label,
-)
+from mjcartpole.media.montage import equally_spaced, sheet, side_by_side, state_at, time_label
 from mjcartpole.media.overlay import Overlay
-from mjcartpole.media.quality import DEFAULT_QUALITY, Quality
-from mjcartpole.media.renderer import DEFAULT_HEIGHT, DEFAULT_WIDTH, Renderer, open_renderer
-from mjcartpole.media.scene import DEFAULT_CAMERA, check_picture
-from mjcartpole.media.video import DEFAULT_FPS
+from mjcartpole.media.renderer import Renderer, open_renderer
 from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.load import ModelLike, load_model
 from mjcartpole.studies.evaluation import SEED, check_count
-from mjcartpole.task import CARTPOLE_V1, CONTROL_STEP, N_ACTIONS, Task, worst_pole
-
-FALL_SECONDS: Final = 1.0
-"""How much of an episode's end a film of its fall shows."""
-FALL_SPEED: Final = 0.25
-
-LEAST_FPS: Final = 1
-MOST_FPS: Final = 1_000
-LEAST_SPEED: Final = 0.001
-MOST_SPEED: Final = 1_000
+from mjcartpole.studies.video_options import VideoOptions
+from mjcartpole.task import CARTPOLE_V1, N_ACTIONS, Task, worst_pole
 
 _ROUNDING: Final = 1e-6
 """More than what a place can be off by, in control steps."""
@@ -77,66 +57,6 @@ class PolicySetup:
     def cartpole(self) -> CartPole:
         """What is drawn."""
         return load_model(self.model)
-
-
-@dataclass(frozen=True)
-class VideoOptions:
-    """How a film looks.
-
-    Attributes:
-        width: Pixels of one picture; a grid of several is larger.
-        height: Pixels.
-        camera: A camera of the model.
-        quality: See `open_renderer`.
-        overlay: Write step, return, state, action and action values into the picture.
-        speed: 0.25 is four times slower than the motion.
-        fps: Frames per second of the film.
-        fall: Show the end of each episode alone, in slow motion.
-    """
-
-    width: int = DEFAULT_WIDTH
-    height: int = DEFAULT_HEIGHT
-    camera: str = DEFAULT_CAMERA
-    quality: Quality = DEFAULT_QUALITY
-    overlay: bool = False
-    speed: float = 1.0
-    fps: float = DEFAULT_FPS
-    fall: bool = False
-
-    def check(self, cartpole: CartPole) -> None:
-        """Refuse what makes no sense, before anything is played.
-
-        Raises:
-            RenderError: See above.
-        """
-        check_picture(cartpole, self.width, self.height, self.camera)
-        if not LEAST_FPS <= self.fps <= MOST_FPS:
-            raise RenderError(
-                f"fps {self.fps:g} makes no sense; use {LEAST_FPS} to {MOST_FPS}, such as 50"
-            )
-        if not LEAST_SPEED <= self.speed <= MOST_SPEED:
-            raise RenderError(
-                f"speed {self.speed:g} makes no sense; use {LEAST_SPEED} to {MOST_SPEED}: "
-                "0.25 is four times slower, 1 as it was"
-            )
-
-    def places(self, states: int, control_step: float = CONTROL_STEP) -> npt.NDArray[np.float64]:
-        """Where in an episode each frame lies, in control steps.
-
-        Args:
-            states: How many the episode has.
-            control_step: Seconds from one to the next.
-        """
-        # Played as it was, a film has a frame per control step of 0.02 s at 50 frames per second.
-        steps_per_frame = self.speed / (control_step * self.fps)
-        if self.fall:
-            return last_seconds(
-                states,
-                seconds=FALL_SECONDS,
-                speed=FALL_SPEED * steps_per_frame,
-                steps_per_second=1 / control_step,
-            )
-        return played(states, speed=steps_per_frame)
 
 
 @dataclass(frozen=True, eq=False)

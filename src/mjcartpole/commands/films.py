@@ -1,0 +1,186 @@
+"""Films as commands make them: named, drawn with a progress bar, told of."""
+
+import contextlib
+import re
+from collections.abc import Callable, Generator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from PIL import Image
+
+from mjcartpole.commands.options import VIDEOS
+from mjcartpole.commands.printing import counted
+from mjcartpole.commands.progress import progress_bar
+from mjcartpole.errors import RunError
+from mjcartpole.files import atomic_write, free_path
+from mjcartpole.learning import runs
+from mjcartpole.learning.documents import read_summary
+from mjcartpole.learning.naming import shortened
+from mjcartpole.learning.training import TrainResult
+from mjcartpole.media.encoders import find_ffmpeg
+from mjcartpole.media.video import Video, write_video
+from mjcartpole.physics.cartpole import CartPole
+from mjcartpole.signals import Interrupted, StopSignals
+from mjcartpole.studies.film import Film, Frame, PolicySetup, Rollout, play
+from mjcartpole.studies.video_options import VideoOptions
+
+SHEET_FRAMES = 10
+"""Pictures on a contact sheet."""
+_INSTEAD = {".mp4": (".gif",)}
+"""What may be written in an mp4's place (see `write_video`)."""
+MOST_NAME = 216
+"""Bytes of a video's name; that of a file may have 255."""
+MOST_NAMES = 3
+"""Runs that a video's file is named after; of more, the first one stands for all."""
+
+Casts = Sequence[Sequence[Rollout]]
+
+
+def default_path(setups: Sequence[PolicySetup], suffix: str, overwrite: bool = False) -> Path:
+    """Return where a film goes that was given no place: one that is free, unless it overwrites."""
+    names = [setup.name for setup in setups]
+    if len(names) > MOST_NAMES:
+        names[1:] = [f"{len(names) - 1}-others"]
+    name = "-beside-".join(shortened(name, MOST_NAME // len(names)) for name in names)
+    path = VIDEOS / f"{name}{suffix}"
+    return path if overwrite else free_path(path, _INSTEAD.get(suffix, ()))
+
+
+def instead_of(path: Path, suffix: str) -> list[Path]:
+    """Return what may be written here in place of a film."""
+    return [path.with_suffix(other) for other in _INSTEAD.get(suffix, ()) if not find_ffmpeg()]
+
+
+def film(casts: Casts, look: VideoOptions, path: Path, signals: StopSignals) -> Path:
+    """Draw rollouts and write them as a video; print what came out, and return where it is.
+
+    Raises:
+        Interrupted: A signal came; nothing was written.
+    """
+    video, drawn_by = write_film(casts, look, path, signals)
+    print(
+        f"video  {video.path}  ({what_happened(casts)}; {video.frames / video.fps:.1f} s, "
+        f"{video.width}x{video.height}, drawn by {drawn_by})"
+    )
+    return video.path
+
+
+def write_film(
+    casts: Casts,
+    look: VideoOptions,
+    path: Path,
+    signals: StopSignals,
+    check: Callable[[], None] = lambda: None,
+) -> tuple[Video, str]:
+    """Draw rollouts and write them as a video; return that, and who has drawn it.
+
+    Args:
+        casts: See `Film`.
+        look: How it looks.
+        path: The video.
+        signals: Where a signal that shall end it is noted.
+        check: Called before each frame; what it raises ends it too.
+
+    Raises:
+        Interrupted: A signal came; nothing was written.
+    """
+    # Noted, and looked at between frames: raised in the midst of OpenGL or of what Python cleans
+    # up, an interrupt would be lost.
+    with (
+        signals.deferred(),
+        Film(casts, look) as drawn,
+        contextlib.closing(_with_progress(drawn, signals, check)) as frames,
+    ):
+        return write_video(path, frames, fps=look.fps), drawn.drawn_by
+
+
+def _with_progress(
+    drawn: Film, signals: StopSignals, check: Callable[[], None]
+) -> Generator[Frame]:
+    with progress_bar() as bar:
+        for frame in bar.track(drawn.frames(), total=drawn.length, description="filming"):
+            check()
+            raise_noted(signals)
+            yield frame
+
+
+def raise_noted(signals: StopSignals) -> None:
+    """Raise `Interrupted` if a signal has come."""
+    if signals.stop():
+        raise Interrupted(number=signals.number)
+
+
+def what_happened(casts: Casts) -> str:
+    """Return in words what a film shows."""
+    takes = [take for takes in casts for take in takes]
+    if len(takes) == 1:
+        return f"{counted(takes[0].episode.steps, 'step')}, {takes[0].episode.ending}"
+    steps = [take.episode.steps for take in takes]
+    return f"{len(takes)} episodes of {min(steps)} to {max(steps)} steps"
+
+
+def write_sheet(casts: Casts, look: VideoOptions, path: Path, signals: StopSignals) -> None:
+    """Draw equally spaced frames of a take as one picture; print what came out.
+
+    Raises:
+        Interrupted: See `film`.
+    """
+    with signals.deferred(), Film(casts, look) as drawn:
+        picture = drawn.contact_sheet(SHEET_FRAMES)
+        raise_noted(signals)
+        with atomic_write(path) as temporary:
+            Image.fromarray(picture).save(temporary)
+        height, width = picture.shape[:2]
+        print(
+            f"sheet  {path}  ({what_happened(casts)}; {width}x{height}, drawn by {drawn.drawn_by})"
+        )
+
+
+def film_result(
+    result: TrainResult,
+    cartpole: CartPole,
+    folder: Path,
+    summary: dict[str, Any],
+    signals: StopSignals,
+) -> None:
+    """Film the first evaluation episode of a run into videos/, and name it in the summary.
+
+    Args:
+        result: What was learned.
+        cartpole: The model that it was learned on.
+        folder: The run folder.
+        summary: Its summary; one that names a film was written before a kill.
+        signals: See `film`.
+
+    Raises:
+        Interrupted: See `film`.
+    """
+    config = result.config
+    model = cartpole if config.backend == "mujoco" else "cartpole"
+    name = folder.resolve().name
+    setup = PolicySetup(
+        name, result.policy, config.backend, model, config.integrator, task=config.rules
+    )
+    path = _own_film(folder, summary) or default_path([setup], ".mp4")
+    # Named before it is drawn: resumed after a kill, the training takes no second name.
+    summary["video"] = str(path)
+    runs.write_summary(folder, summary)
+    written = film([play(setup)], VideoOptions(), path, signals)
+    if written != path:
+        summary["video"] = str(written)
+        runs.write_summary(folder, summary)
+
+
+def remove_film(folder: Path) -> None:
+    """Remove the film of a run that is about to be replaced, if it is where training puts it."""
+    with contextlib.suppress(RunError):
+        path = _own_film(folder, read_summary(folder))
+        if path is not None:
+            path.unlink(missing_ok=True)
+
+
+def _own_film(folder: Path, summary: Mapping[str, Any]) -> Path | None:
+    """Return the film that a run's summary names, if a training of it may have written it."""
+    shown, name = Path(str(summary.get("video", ""))), shortened(folder.resolve().name, MOST_NAME)
+    own = re.fullmatch(re.escape(name) + r"(-\d+)?\.(mp4|gif)", shown.name)
+    return shown if own and shown.parent == VIDEOS else None

@@ -1,0 +1,95 @@
+"""How commands find a policy, and where to play it."""
+
+import sys
+from pathlib import Path
+
+from mjcartpole.commands.options import EvalTarget
+from mjcartpole.envs.backend import Backend, check_backend
+from mjcartpole.errors import ConfigError, RunError
+from mjcartpole.files import is_file
+from mjcartpole.integrator import Integrator
+from mjcartpole.learning import runs
+from mjcartpole.learning.documents import read_summary
+from mjcartpole.learning.policy import Policy
+from mjcartpole.physics.load import ModelLike, load_model
+from mjcartpole.physics.simulation import silence_mujoco
+from mjcartpole.studies import evaluation, multi_seed_runs
+from mjcartpole.studies.film import PolicySetup
+from mjcartpole.task import CARTPOLE_V1, task_named
+
+
+def set_up(source: Path, target: EvalTarget) -> PolicySetup:
+    """Find a policy, and where to play it: as it was trained, unless the target says otherwise.
+
+    Raises:
+        MjCartPoleError: Something cannot be used.
+    """
+    silence_mujoco()
+    seed = evaluation.SEED if target.seed is None else target.seed
+    evaluation.check_count(1, seed)
+    backend: Backend
+    integrator: Integrator
+    run: runs.Run | None = None
+    if is_file(source):
+        # Every run's own is called policy.json: its folder tells them apart.
+        name = _run_name(source.parent) if source.name == runs.POLICY else source.stem
+        policy = Policy.load(source)
+        backend, integrator, model, own_timestep = "mujoco", "gym", "cartpole", False
+        task = CARTPOLE_V1.name
+        if target.allow_assets:
+            raise ConfigError("--allow-assets is for the model of a run; a policy's file has none")
+    else:
+        run = runs.load_run(source)
+        name, policy = _run_name(run.folder), run.policy
+        backend, integrator = run.config.backend, run.config.integrator
+        model, own_timestep, task = str(run.model), run.config.own_timestep, run.config.task
+    backend = target.backend or backend
+    if backend == "gym":
+        # Gymnasium's cart-pole has neither; only what the user asks for is held against that.
+        integrator, model, own_timestep = "gym", "cartpole", False
+    model, integrator = target.model or model, target.integrator or integrator
+    check_backend(backend, model, integrator, target.set, own_timestep=target.own_timestep)
+    own_timestep = own_timestep or target.own_timestep
+    played_on: ModelLike = model
+    if run is not None and model == str(run.model):
+        played_on = run.cartpole(target.allow_assets, own_timestep=own_timestep)
+    if target.set or (own_timestep and played_on == model):
+        played_on = load_model(played_on, target.set, own_timestep=own_timestep)
+    rules = task_named(target.task or task)
+    return PolicySetup(name, policy, backend, played_on, integrator, seed, rules)
+
+
+def _run_name(folder: Path) -> str:
+    """Return a run's name; a seed's among many begins with theirs."""
+    path = folder.resolve()
+    return f"{path.parent.name}-{path.name}" if multi_seed_runs.is_seeds(path.parent) else path.name
+
+
+def learned_seeds(folder: Path) -> dict[int, Path]:
+    """Return the runs of many seeds that have a policy; say on stderr which have none.
+
+    Raises:
+        RunError: None has one, or the folder is damaged.
+    """
+    learned, without = multi_seed_runs.learned_seeds(folder)
+    if without:
+        count, all_seeds = len(without), len(without) + len(learned)
+        which = f"{count} of {all_seeds} seeds in {folder} without a policy"
+        print(f"mjcartpole: {which}, such as seed {without[0]}: left out", file=sys.stderr)
+    return learned
+
+
+def median_seed(folder: Path) -> tuple[Path, int]:
+    """Return the run in the middle of many seeds, the lower of two, by mean return, and how many.
+
+    Raises:
+        RunError: None is complete, or the folder is damaged.
+    """
+    complete = [run for run in learned_seeds(folder).values() if runs.is_complete(run)]
+    if not complete:
+        raise RunError(
+            f"no seed in '{folder}' is complete; go on with `mjcartpole train --resume {folder}`"
+        )
+    means = {run: float(read_summary(run)["evaluation"]["mean"]) for run in complete}
+    ranked = sorted(complete, key=means.__getitem__)
+    return ranked[(len(ranked) - 1) // 2], len(ranked)

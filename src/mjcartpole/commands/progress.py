@@ -1,0 +1,67 @@
+"""Progress bars on stderr: on terminals only, and gone when the work is done."""
+
+import sys
+
+from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    ProgressColumn,
+    Task,
+    TextColumn,
+    TimeRemainingColumn,
+)
+from rich.text import Text
+
+from mjcartpole.learning.compiling import compiling
+from mjcartpole.learning.session import Session
+from mjcartpole.signals import StopSignals
+from mjcartpole.studies.multi_seed import SeedRunner
+
+RUNNING_MEAN = 100
+"""Episodes in the progress bar's mean."""
+
+
+class _Doing(ProgressColumn):
+    def render(self, task: Task) -> Text:
+        return Text("compiling" if compiling else "training")
+
+
+def progress_bar(*columns: ProgressColumn) -> Progress:
+    """Return a bar; the usual one if no columns are given."""
+    console = Console(stderr=True)
+    return Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
+
+
+def train_session(session: Session, signals: StopSignals) -> None:
+    """Train to the end or to a signal; print on a terminal how fast it was."""
+    columns = (
+        _Doing(),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("episodes, mean return {task.fields[mean]:5.1f}"),
+        TimeRemainingColumn(),
+    )
+    training = session.training
+    with progress_bar(*columns) as progress:
+        done = len(training.log)
+        bar = progress.add_task("", total=training.config.episodes, completed=done, mean=0.0)
+        for finished in session.run(signals.stop):
+            recent = training.log.storage.totals[max(0, finished - RUNNING_MEAN) : finished]
+            progress.update(bar, completed=finished, mean=recent.mean())
+    if progress.console.is_terminal:
+        # No two runs take the same time: what stdout says is the same each time.
+        result = training.result()
+        rate = result.steps / result.seconds if result.seconds else 0.0
+        speed = f"{result.steps:,} steps in {result.seconds:.1f} s ({rate:,.0f} per second)"
+        print(speed, file=sys.stderr, flush=True)
+
+
+def train_seeds(runner: SeedRunner, signals: StopSignals) -> None:
+    """Train all seeds to the end or to a signal."""
+    columns = (_Doing(), BarColumn(), MofNCompleteColumn(), TextColumn("seeds"))
+    with progress_bar(*columns) as progress:
+        bar = progress.add_task("", total=len(runner.seeds))
+        for found in runner.run(signals.stop):
+            progress.update(bar, advance=0 if found is None else 1)

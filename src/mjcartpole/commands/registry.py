@@ -1,0 +1,58 @@
+"""Every command of the command line: a file each, and its entry here."""
+
+import functools
+import operator
+from collections.abc import Sequence
+from typing import Annotated, Any, Final
+
+import tyro
+
+from mjcartpole.commands.doctor import Doctor
+from mjcartpole.commands.evaluate import Evaluate
+from mjcartpole.commands.model import Model
+from mjcartpole.commands.options import Command
+from mjcartpole.commands.parity import Parity
+from mjcartpole.commands.render import Render
+from mjcartpole.commands.train import Train
+from mjcartpole.commands.transfer import Transfer
+from mjcartpole.commands.watch import Watch
+
+COMMANDS: Final[list[type[Command]]] = [
+    Train,
+    Evaluate,
+    Render,
+    Parity,
+    Doctor,
+    Model,
+    Transfer,
+    Watch,
+]
+
+
+def name_of(command: type[Command]) -> str:
+    """Return the word that a command is called by."""
+    return command.__name__.lower()
+
+
+def default_of(command: type[Command], words: Sequence[str]) -> Command | None:
+    """Return what is meant by flags that are left out, where the words name the command.
+
+    Raises:
+        ConfigError: A word that decides it makes no sense.
+    """
+    return command.default(words) if words[:1] == [name_of(command)] else None
+
+
+def grammar(words: Sequence[str]) -> Any:  # noqa: ANN401 - a union that is made here
+    """Return the type that tyro reads a command line as.
+
+    Raises:
+        ConfigError: See `default_of`.
+    """
+    parts = [_subcommand(command, default_of(command, words)) for command in COMMANDS]
+    return functools.reduce(operator.or_, parts)
+
+
+def _subcommand(command: type[Command], default: Command | None) -> Any:  # noqa: ANN401
+    given: dict[str, Any] = {} if default is None else {"default": default}
+    return Annotated[command, tyro.conf.subcommand(name_of(command), **given)]

@@ -1,0 +1,118 @@
+"""One training, new or continued: trained, evaluated, filmed, and told of."""
+
+from pathlib import Path
+
+from mjcartpole.commands.films import film_result, remove_film
+from mjcartpole.commands.options import VIDEOS
+from mjcartpole.commands.printing import counted, print_evaluation
+from mjcartpole.commands.progress import train_session
+from mjcartpole.commands.train_options import RunLocation, TrainOptions
+from mjcartpole.commands.train_shared import about, changes, check, go_on, prepare, unfinished
+from mjcartpole.files import check_writable, make_folder
+from mjcartpole.learning import runs
+from mjcartpole.learning.checkpoints import LATEST
+from mjcartpole.learning.config import TrainConfig
+from mjcartpole.learning.runs import Begun
+from mjcartpole.learning.session import Session
+from mjcartpole.learning.training import Training, TrainResult
+from mjcartpole.signals import Interrupted, StopSignals
+from mjcartpole.studies.finish_training import finish_training
+
+
+def train(config: TrainConfig, how: TrainOptions, where: RunLocation) -> int:
+    """Train, evaluate, film; print what came out. Returns the exit code.
+
+    Raises:
+        Interrupted: After Ctrl-C, SIGTERM or SIGHUP, when what was learned is kept; says where.
+    """
+    cartpole = prepare(config, how)
+    folder = where.folder(config)
+    begun = Begun(folder, where.preset, how.video, config, cartpole, checkpoint=None)
+    signals = StopSignals()
+    with signals.caught(), runs.claimed_folder(folder, overwrite=where.overwrite):
+        if how.video:
+            check_writable(make_folder(VIDEOS))
+        session = _session(begun, how)
+        print(
+            f"{where.preset} on {config.backend}: {counted(config.episodes, 'episode')}, "
+            f"seed {config.seed}{about(where, folder, config)}",
+            flush=True,
+        )
+        remove_film(folder)
+        runs.begin_run(folder, config, cartpole, preset=where.preset, video=how.video)
+        _finish(session, begun, how, signals)
+    return 0
+
+
+def resume(path: Path, how: TrainOptions) -> int:
+    """Continue a training as if it had not been interrupted. Returns the exit code.
+
+    Raises:
+        Interrupted: Again; see `train`.
+    """
+    check(how)
+    folder = runs.run_folder(path)
+    if path == folder and runs.is_complete(folder):
+        runs.check_complete(folder, how.allow_assets)
+        print(f"{folder} is complete: nothing is left to do{unfinished(folder)}")
+        return 0
+    signals = StopSignals()
+    with signals.caught(), runs.resumed_folder(path, how.allow_assets) as begun:
+        config, session = begun.config, _session(begun, how)
+        print(
+            f"{begun.preset} on {config.backend}: goes on after {_done(session)}, "
+            f"seed {config.seed}{changes(begun.preset, config)}",
+            flush=True,
+        )
+        _finish(session, begun, how, signals)
+    return 0
+
+
+def _session(begun: Begun, how: TrainOptions) -> Session:
+    training = Training(begun.config, engine=how.engine, cartpole=begun.cartpole)
+    session = Session(begun.folder, training, begun.cartpole, every=how.checkpoint_every)
+    session.resume(begun.checkpoint)
+    return session
+
+
+def _finish(session: Session, begun: Begun, how: TrainOptions, signals: StopSignals) -> None:
+    """Train to the end or to a signal; write, print, evaluate and film."""
+    folder = begun.folder
+    try:
+        with signals.deferred():
+            train_session(session, signals)
+            events = how.tensorboard or runs.has_events(folder)
+            result, summary, greedy = finish_training(
+                session, folder, begun.cartpole, preset=begun.preset, events=events
+            )
+        _print_learning(result)
+        if signals.stop() or greedy is None:
+            raise Interrupted(number=signals.number)
+        print_evaluation(greedy)
+        print(f"\nrun    {folder}", flush=True)
+        if how.video and begun.video:
+            film_result(result, begun.cartpole, folder, summary, signals)
+        runs.finish_run(folder)
+    except Interrupted as interrupted:
+        said = f"interrupted after {_done(session)}{_kept(folder)}"
+        raise Interrupted(said, signals.number) from interrupted
+
+
+def _done(session: Session) -> str:
+    training = session.training
+    return f"{len(training.log):,} of {counted(training.config.episodes, 'episode')}"
+
+
+def _kept(folder: Path) -> str:
+    if not (folder / LATEST).exists():
+        return ", before anything was saved"
+    return f"; what was learned is kept in {folder}; go on with: {go_on(folder)}"
+
+
+def _print_learning(result: TrainResult) -> None:
+    """Print the article's table: mean return of each `log_every` episodes."""
+    returns, every = result.returns, result.config.log_every
+    print("\n episode   mean return")
+    for start in range(0, len(returns), every):
+        block = returns[start : start + every]
+        print(f"{start + len(block):8,} {block.mean():13.1f}")

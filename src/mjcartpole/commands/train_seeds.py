@@ -1,0 +1,88 @@
+"""Many seeds side by side, new or continued: trained, evaluated, and told of."""
+
+import sys
+from pathlib import Path
+
+from mjcartpole.commands import progress
+from mjcartpole.commands.options import FAILED
+from mjcartpole.commands.printing import counted, print_seeds
+from mjcartpole.commands.train_options import RunLocation, TrainOptions
+from mjcartpole.commands.train_shared import about, changes, check, go_on, prepare
+from mjcartpole.learning.config import TrainConfig
+from mjcartpole.signals import Interrupted, StopSignals
+from mjcartpole.studies import multi_seed_runs
+from mjcartpole.studies.multi_seed import SeedRunner, check_seeds
+from mjcartpole.studies.multi_seed_runs import ManyBegun
+
+
+def train(config: TrainConfig, how: TrainOptions, where: RunLocation, seeds: int) -> int:
+    """Train many seeds, and print statistics over them. Returns the exit code.
+
+    Raises:
+        Interrupted: After Ctrl-C, SIGTERM or SIGHUP, when what was learned is kept; says where.
+    """
+    cartpole = prepare(config, how)
+    folder = where.folder(config, seeds)
+    begun = ManyBegun(where.preset, config, check_seeds(config, seeds), cartpole)
+    runner, signals = _runner(begun, folder, how), StopSignals()
+    with signals.caught(), multi_seed_runs.claimed_seeds(folder, overwrite=where.overwrite):
+        multi_seed_runs.begin_seeds(folder, config, runner.seeds, cartpole, preset=where.preset)
+        _print_head(runner, begun, about(where, folder, config, seeds))
+        return _finish(runner, folder, signals)
+
+
+def resume(folder: Path, how: TrainOptions) -> int:
+    """Continue many seeds as if they had not been interrupted. Returns the exit code.
+
+    Raises:
+        Interrupted: Again; see `train`.
+    """
+    check(how)
+    signals = StopSignals()
+    with signals.caught(), multi_seed_runs.resumed_seeds(folder, how.allow_assets) as begun:
+        runner = _runner(begun, folder, how)
+        _print_head(runner, begun, changes(begun.preset, begun.config))
+        return _finish(runner, folder, signals)
+
+
+def _runner(begun: ManyBegun, folder: Path, how: TrainOptions) -> SeedRunner:
+    return SeedRunner(
+        begun.config,
+        begun.seeds,
+        begun.cartpole,
+        workers=how.workers,
+        engine=how.engine,
+        folder=folder,
+        preset=begun.preset,
+        every=how.checkpoint_every,
+        events=how.tensorboard,
+        allow_assets=how.allow_assets,
+    )
+
+
+def _print_head(runner: SeedRunner, begun: ManyBegun, more: str) -> None:
+    print(
+        f"{begun.preset} on {begun.config.backend}: {counted(len(runner.seeds), 'seed')} from "
+        f"{runner.seeds[0]}, {counted(begun.config.episodes, 'episode')} each, "
+        f"{runner.workers} at once{more}\n",
+        flush=True,
+    )
+
+
+def _finish(runner: SeedRunner, folder: Path, signals: StopSignals) -> int:
+    """Train all seeds or to a signal; write and print."""
+    with signals.deferred():
+        progress.train_seeds(runner, signals)
+    many = runner.result()
+    multi_seed_runs.write_seeds(folder, many)
+    print_seeds(many)
+    print(f"\nruns   {folder}", flush=True)
+    if signals.stop():
+        raise Interrupted(
+            f"interrupted with {len(many.scores)} of {len(runner.seeds)} seeds done; what was "
+            f"learned is kept in {folder}; go on with: {go_on(folder)}",
+            signals.number,
+        )
+    for found in many.failed:
+        print(f"mjcartpole: error: seed {found.seed} failed: {found.error}", file=sys.stderr)
+    return FAILED if many.failed else 0

@@ -1,0 +1,71 @@
+"""What one training and one of many seeds share: checks before it begins, and words for it."""
+
+import shlex
+import sys
+from pathlib import Path
+
+from mjcartpole.commands.train_options import RunLocation, TrainOptions
+from mjcartpole.files import is_file
+from mjcartpole.learning import runs, tensorboard
+from mjcartpole.learning.config import TrainConfig
+from mjcartpole.learning.documents import CONFIG
+from mjcartpole.learning.naming import in_flags, namesakes
+from mjcartpole.learning.run_model import check_storable
+from mjcartpole.learning.session import check_interval
+from mjcartpole.physics.cartpole import CartPole
+from mjcartpole.physics.playable import why_unplayable
+from mjcartpole.physics.simulation import silence_mujoco
+
+
+def prepare(config: TrainConfig, how: TrainOptions) -> CartPole:
+    """Check all that can be checked before a folder is touched, and return the model.
+
+    Raises:
+        MjCartPoleError: Something makes no sense or cannot be used.
+    """
+    check(how)
+    cartpole = config.load_model()
+    config.discretizer(cartpole.poles)
+    check_storable(cartpole)
+    why = why_unplayable(cartpole, config.integrator) if config.backend == "mujoco" else None
+    if why:
+        print(f"mjcartpole: {why}", file=sys.stderr)
+    return cartpole
+
+
+def check(how: TrainOptions) -> None:
+    """Refuse options that make no sense.
+
+    Raises:
+        ConfigError: See above.
+    """
+    silence_mujoco()
+    check_interval(how.checkpoint_every)
+    if how.tensorboard:
+        tensorboard.check_installed()
+
+
+def changes(preset: str, config: TrainConfig) -> str:
+    """Return what a headline says of a config: by what it differs from its preset."""
+    flags = in_flags(preset, config)
+    return f", with {flags}" if flags else ""
+
+
+def about(where: RunLocation, folder: Path, config: TrainConfig, seeds: int = 1) -> str:
+    """Return what a headline says of a new run: its changes, and where it goes if not as usual."""
+    usual, changed = where.usual_folder(config, seeds), changes(where.preset, config)
+    if folder == usual:
+        return changed
+    return f"{changed}\n{usual} is there already: this goes to {folder}{unfinished(folder)}"
+
+
+def unfinished(folder: Path) -> str:
+    """Return how to go on with runs of the same name, but for its number, that are incomplete."""
+    begun = [path for path in namesakes(folder) if is_file(path / CONFIG)]
+    hints = [go_on(path) for path in begun if path != folder and not runs.is_complete(path)]
+    return f"; unfinished beside it: {', '.join(hints)}" if hints else ""
+
+
+def go_on(folder: Path) -> str:
+    """Return the command that goes on with a run."""
+    return f"mjcartpole train --resume {shlex.quote(str(folder))}"
