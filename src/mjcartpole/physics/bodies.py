@@ -1,25 +1,9 @@
 """Which bodies of a model are the cart's, and which each pole's."""
 
-from typing import Protocol
-
 import mujoco
 import numpy as np
 
-
-class HasJoints(Protocol):
-    """A compiled model whose joints have been found."""
-
-    @property
-    def model(self) -> mujoco.MjModel:
-        """The compiled model."""
-
-    @property
-    def slider(self) -> int:
-        """Index of the cart's joint."""
-
-    @property
-    def hinges(self) -> tuple[int, ...]:
-        """Index of each pole's joint."""
+from mjcartpole.physics.cartpole import CartPole
 
 
 def subtree(model: mujoco.MjModel, root: int) -> list[int]:
@@ -31,38 +15,44 @@ def subtree(model: mujoco.MjModel, root: int) -> list[int]:
     return inside
 
 
-def moving_bodies(parts: HasJoints) -> list[int]:
+def moving_bodies(cartpole: CartPole) -> list[int]:
     """Return every body that slides, the poles' included."""
-    return _under(parts, parts.slider)
+    return _under(cartpole, cartpole.slider)
 
 
-def cart_bodies(parts: HasJoints) -> list[int]:
+def cart_bodies(cartpole: CartPole) -> list[int]:
     """Return every body that slides and does not turn."""
-    turning = {body for hinge in parts.hinges for body in _under(parts, hinge)}
-    return [body for body in moving_bodies(parts) if body not in turning]
+    turning = {body for hinge in cartpole.hinges for body in _under(cartpole, hinge)}
+    return [body for body in moving_bodies(cartpole) if body not in turning]
 
 
-def pole_bodies(parts: HasJoints, pole: int = 0) -> list[int]:
+def pole_bodies(cartpole: CartPole, pole: int = 0) -> list[int]:
     """Return all bodies that turn on a pole's hinge, without those of a pole that stands on it."""
-    hinge = parts.hinges[pole]
-    whole = _under(parts, hinge)
+    hinge = cartpole.hinges[pole]
+    whole = _under(cartpole, hinge)
     # MuJoCo counts joints from the cart outwards.
     above = [
         other
-        for other in parts.hinges
-        if other > hinge and int(parts.model.jnt_bodyid[other]) in whole
+        for other in cartpole.hinges
+        if other > hinge and int(cartpole.model.jnt_bodyid[other]) in whole
     ]
-    upper = {body for other in above for body in _under(parts, other)}
+    upper = {body for other in above for body in _under(cartpole, other)}
     return [body for body in whole if body not in upper]
 
 
-def farthest_from_origin(parts: HasJoints) -> float:
-    """Return how far what moves stands from the world's origin when all coordinates are 0, m."""
-    data = mujoco.MjData(parts.model)
+def data_at_zero(model: mujoco.MjModel) -> mujoco.MjData:
+    """Return where all bodies are when all coordinates are 0, which a `ref` can move elsewhere."""
+    data = mujoco.MjData(model)
     data.qpos[:] = 0.0
-    mujoco.mj_kinematics(parts.model, data)
-    joints = [parts.slider, *parts.hinges]
-    places = np.concatenate([data.xipos[moving_bodies(parts)], data.xanchor[joints]])
+    mujoco.mj_kinematics(model, data)
+    return data
+
+
+def farthest_from_origin(cartpole: CartPole) -> float:
+    """Return how far what moves stands from the world's origin when all coordinates are 0, m."""
+    data = data_at_zero(cartpole.model)
+    joints = list(cartpole.joints)
+    places = np.concatenate([data.xipos[moving_bodies(cartpole)], data.xanchor[joints]])
     return float(np.abs(places).max())
 
 
@@ -71,5 +61,5 @@ def mass_of(model: mujoco.MjModel, bodies: list[int]) -> float:
     return float(sum(float(model.body_mass[body]) for body in bodies))
 
 
-def _under(parts: HasJoints, joint: int) -> list[int]:
-    return subtree(parts.model, int(parts.model.jnt_bodyid[joint]))
+def _under(cartpole: CartPole, joint: int) -> list[int]:
+    return subtree(cartpole.model, int(cartpole.model.jnt_bodyid[joint]))

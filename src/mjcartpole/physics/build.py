@@ -14,23 +14,18 @@ from mjcartpole.physics.guard import compile_document
 from mjcartpole.physics.includes import read_whole
 from mjcartpole.physics.sanity_checks import check_motion, check_numbers
 from mjcartpole.physics.structure import (
-    check_directions,
+    UnfitError,
     check_independent,
     check_limits,
     count_from_upright,
     find_controls,
     find_joints,
     find_substeps,
+    refusal,
 )
-from mjcartpole.task import CARTPOLE_V1
 
 _NAMES_FILE: Final = re.compile(r"file\w*\s*=")
 """In the text of a document that depends on other files: includes, meshes, attached models."""
-
-LARGEST_LEAN: Final = CARTPOLE_V1.theta_limit
-"""A pole that leans by more, rad, at its document's angle 0 has its angle counted from upright.
-
-The same for every task: it belongs to the document, which one task stores and another may read."""
 
 
 def build(text: str, name: str, own_timestep: bool, path: Path | None = None) -> CartPole:
@@ -74,22 +69,16 @@ def find_parts(name: str, xml: str, model: mujoco.MjModel, own_timestep: bool) -
         ModelError: It is none, or no simulation survives its numbers.
     """
     check_numbers(name, model)
-    slider, hinges = find_joints(name, model)
-    controls = find_controls(name, model, slider)
-    substeps = 1 if own_timestep else find_substeps(name, model)
-    cartpole = CartPole(name, xml, model, slider, hinges, controls, substeps, (0.0,) * len(hinges))
-    # From the cart outwards: which way a pole on a pole stands depends on the one below it.
-    upright = tuple(_count_from_upright(name, cartpole, pole) for pole in range(cartpole.poles))
-    cartpole = dataclasses.replace(cartpole, upright=upright)
-    check_limits(name, cartpole)
-    check_independent(name, cartpole)
-    check_motion(name, cartpole)
-    return cartpole
-
-
-def _count_from_upright(name: str, cartpole: CartPole, pole: int) -> float:
-    """Have a pole's angle count from upright, if it does not; return the angle that became 0."""
-    upright = check_directions(name, cartpole, pole).upright
-    if abs(upright) <= LARGEST_LEAN:
-        return 0.0
-    return count_from_upright(name, cartpole, pole, upright)
+    try:
+        slider, hinges = find_joints(model)
+        controls = find_controls(model, slider)
+        substeps = 1 if own_timestep else find_substeps(name, model)
+        found = CartPole(name, xml, model, slider, hinges, controls, substeps, ())
+        # From the cart outwards: which way a pole on a pole stands depends on the one below it.
+        upright = tuple(count_from_upright(found, pole) for pole in range(found.poles))
+        check_limits(found)
+        check_independent(found)
+    except UnfitError as unfit:
+        raise refusal(name, model, unfit) from None
+    check_motion(found)
+    return dataclasses.replace(found, upright=upright)

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import mujoco
+import numpy as np
 
 from mjcartpole.physics.includes import portable
-from mjcartpole.physics.structure import motor_of
 from mjcartpole.task import CONTROL_STEP, in_words
 
 INTEGRATORS = {
@@ -89,6 +89,11 @@ class CartPole:
     def integrator(self) -> str:
         """The integrator that the file names, as MJCF spells it (see `INTEGRATORS`)."""
         return str(INTEGRATORS[int(self.model.opt.integrator)])
+
+
+def motor_of(model: mujoco.MjModel) -> int:
+    """Return the index of the actuator that takes a model's one control (others may take none)."""
+    return int(np.flatnonzero(model.actuator_ctrlnum)[0])
 
 
 def own_copy(cartpole: CartPole) -> CartPole:

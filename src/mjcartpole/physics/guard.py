@@ -18,7 +18,7 @@ import mujoco
 
 from mjcartpole.errors import ModelError, ModelSyntaxError, NotACartPoleError
 from mjcartpole.physics.edit.document import Document
-from mjcartpole.physics.library import libmujoco
+from mjcartpole.physics.library import libmujoco, one_line
 
 MEMORY: Final = 768 * 2**20
 """Bytes that a document may take while it is compiled and stepped."""
@@ -62,11 +62,6 @@ def compile_document(document: Document, name: str) -> mujoco.MjModel:
         return mujoco.MjModel.from_xml_string(text)
     except (ValueError, mujoco.FatalError) as error:
         raise _invalid(name, str(error)) from error
-
-
-def one_line(message: str) -> str:
-    """Return what MuJoCo says in one line."""
-    return " ".join(message.split()).removeprefix("XML Error: ").removeprefix("Error: ")
 
 
 def _is_plain(document: Document) -> bool:

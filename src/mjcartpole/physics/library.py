@@ -1,4 +1,4 @@
-"""MuJoCo's own library: where it lies, for compiled code that calls it, and how it writes."""
+"""MuJoCo's C library: where it lies, how it complains, and how many digits it writes."""
 
 import contextlib
 import ctypes
@@ -16,6 +16,11 @@ def libmujoco() -> Path | None:
         for path in sorted(folder.glob(pattern)):
             return path
     return None
+
+
+def one_line(message: object) -> str:
+    """Return what MuJoCo says in one line."""
+    return " ".join(str(message).split()).removeprefix("XML Error: ").removeprefix("Error: ")
 
 
 _ENOUGH: Final = 17

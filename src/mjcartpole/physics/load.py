@@ -19,9 +19,8 @@ from mjcartpole.errors import ConfigError, ModelNotFoundError, ModelSyntaxError
 from mjcartpole.physics.build import build, compile_text, find_parts
 from mjcartpole.physics.cartpole import CartPole, own_copy
 from mjcartpole.physics.edit.edits import edit_document, edits_of
-from mjcartpole.physics.guard import one_line
 from mjcartpole.physics.includes import read_text, read_whole
-from mjcartpole.physics.library import all_digits
+from mjcartpole.physics.library import all_digits, one_line
 
 ModelLike: TypeAlias = str | os.PathLike[str] | mujoco.MjSpec | CartPole
 """What `load_model` takes: a name, a path, an XML document, an MjSpec, or a loaded cart-pole."""
@@ -186,7 +185,7 @@ def _from_spec(spec: mujoco.MjSpec) -> tuple[str, str, mujoco.MjModel]:
     try:
         model = spec.compile()
     except (ValueError, mujoco.FatalError) as error:
-        raise ModelSyntaxError(f"the MjSpec does not compile: {one_line(str(error))}") from error
+        raise ModelSyntaxError(f"the MjSpec does not compile: {one_line(error)}") from error
     with all_digits():
         text = spec.to_xml()
     xml = read_whole(text, "the MjSpec", Path(spec.modelfiledir)).text

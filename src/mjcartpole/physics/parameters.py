@@ -1,7 +1,6 @@
 """The parameters of the equations, read from a compiled model.
 
-`read_parameters` takes the numbers that act; `beyond.py` names everything else that acts on the
-motion.
+`read_parameters` takes the numbers that act; `unmodelled_effects.py` names all else that acts.
 """
 
 import copy
@@ -16,7 +15,7 @@ import numpy.typing as npt
 
 from mjcartpole import task
 from mjcartpole.errors import ModelError, NotACartPoleError
-from mjcartpole.physics.bodies import cart_bodies, mass_of, pole_bodies
+from mjcartpole.physics.bodies import cart_bodies, data_at_zero, mass_of, pole_bodies
 from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.dry_friction import DryFriction
 from mjcartpole.physics.equations import Parameters
@@ -111,8 +110,7 @@ def _frictions(cartpole: CartPole) -> dict[int, DryFriction]:
     # As explicit Euler and the other integrators solve it; `discrete` has its own way.
     model = copy.copy(cartpole.model)
     model.opt.integrator = mujoco.mjtIntegrator.mjINT_EULER
-    data = mujoco.MjData(model)
-    data.qpos[:] = 0.0
+    data = data_at_zero(model)
     mujoco.mj_fwdPosition(model, data)
     mujoco.mj_fwdVelocity(model, data)
     kind = int(mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF)
@@ -145,13 +143,14 @@ def geometry_of(cartpole: CartPole, up: Vector | None = None) -> _Geometry:
         cartpole: A model of one pole.
         up: Unit, shape (3,); against gravity if None.
     """
-    axes, up = axes_of(cartpole), _up(cartpole) if up is None else up
-    hinge_tilt = _angle(axes.hinge, up)
+    axes, gravity = directions(cartpole), cartpole.model.opt.gravity
+    if up is None:
+        up = -gravity / np.linalg.norm(gravity) if gravity.any() else axes.up
     # In the plane in which the pole turns: up, and where a positive angle leans.
     high = up - (axes.hinge @ up) * axes.hinge
     high /= np.linalg.norm(high)
     aside = np.cross(axes.hinge, high)
-    com = axes.pole_frame @ pole_of(cartpole).com
+    com = axes.frame @ pole_of(cartpole).com
     above, beside = float(com @ high), float(com @ aside)
     lean = math.atan2(beside, above) if above >= 0 else math.atan2(-beside, -above)
     distance = above
@@ -161,10 +160,10 @@ def geometry_of(cartpole: CartPole, up: Vector | None = None) -> _Geometry:
         lean = 0.0
     return _Geometry(
         com_distance=distance,
-        hinge_sign=-1 if axes.slider @ aside < 0 else 1,
-        rail_tilt=_angle(axes.slider, up),
-        hinge_tilt=hinge_tilt,
-        skew=_angle(axes.slider, axes.hinge),
+        hinge_sign=-1 if axes.rail @ aside < 0 else 1,
+        rail_tilt=_angle(axes.rail, up),
+        hinge_tilt=_angle(axes.hinge, up),
+        skew=_angle(axes.rail, axes.hinge),
         lean=lean,
     )
 
@@ -173,15 +172,6 @@ def _angle(axis: Vector, other: Vector) -> float:
     """Return between an axis and the plane that is square to another, rad."""
     sine = float(axis @ other)
     return 0.0 if abs(sine) < TILT else math.asin(min(max(sine, -1.0), 1.0))
-
-
-def _up(cartpole: CartPole) -> Vector:
-    """Return what is up, unit, shape (3,): against gravity, or the axis that counts as up."""
-    gravity = cartpole.model.opt.gravity
-    if not gravity.any():
-        return directions(cartpole).up
-    up: Vector = -gravity / np.linalg.norm(gravity)
-    return up
 
 
 def several_poles(cartpole: CartPole) -> str:
@@ -242,27 +232,6 @@ class _Pole:
     mass: float  # kg
     com: Vector  # from the hinge, m, shape (3,)
     inertia: float  # about the centre of mass and the hinge's direction, kg m^2
-
-
-@dataclass(frozen=True)
-class _Axes:
-    """Directions in the world when both coordinates are 0."""
-
-    slider: Vector  # where a positive x goes, unit, shape (3,)
-    hinge: Vector  # what a positive angle turns about, unit, shape (3,)
-    pole_frame: Vector  # orientation of the hinge's body, shape (3, 3)
-
-
-def axes_of(cartpole: CartPole, pole: int = 0) -> _Axes:
-    """Return where the cart's joint and a pole's point when all coordinates are 0."""
-    model = cartpole.model
-    data = mujoco.MjData(model)
-    data.qpos[:] = 0.0  # angle 0, which a joint's `ref` can move away from the file's own pose
-    mujoco.mj_kinematics(model, data)
-    joint = cartpole.hinges[pole]
-    frame = data.xmat[model.jnt_bodyid[joint]].reshape(3, 3)
-    slider, hinge = data.xaxis[cartpole.slider], data.xaxis[joint]
-    return _Axes(slider.copy(), hinge.copy(), frame.copy())
 
 
 def pole_of(cartpole: CartPole, pole: int = 0) -> _Pole:

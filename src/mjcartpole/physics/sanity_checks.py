@@ -3,13 +3,14 @@
 import functools
 import itertools
 from collections.abc import Iterator
-from typing import Any, Final, Protocol
+from typing import Any, Final
 
 import mujoco
 import numpy as np
 
 from mjcartpole.errors import ModelError
-from mjcartpole.physics.bodies import HasJoints
+from mjcartpole.physics.cartpole import CartPole
+from mjcartpole.physics.library import one_line
 
 MOST_MEMORY: Final = 2**29
 """Bytes that a model may ask for, for contacts and constraints."""
@@ -26,21 +27,11 @@ _MAY_BE_INFINITE: Final = {"jnt_range", "tendon_range"}
 MOST_ITERATIONS: Final = 10_000
 """Of a solver, per step."""
 
-
 MOST_FACETS: Final = 512
 """Of a sphere or a plane, in each direction; 28 is MuJoCo's default."""
 
-
 _ASIDE: Final = 0.05
 """Every coordinate and velocity of a state that is not at rest, SI units."""
-
-
-class HasParts(HasJoints, Protocol):
-    """A compiled model whose joints and controls have been found."""
-
-    @property
-    def controls(self) -> tuple[float, float]:
-        """The actuator's control for action 0 and for action 1."""
 
 
 def check_numbers(name: str, model: mujoco.MjModel) -> None:
@@ -85,25 +76,21 @@ def _amounts(model: mujoco.MjModel) -> Iterator[tuple[int, int, str]]:
         yield asked, most, f"{drawn}: look at <visual><quality>"
 
 
-def check_motion(name: str, parts: HasParts) -> None:
+def check_motion(cartpole: CartPole) -> None:
     """Refuse a model whose first step already ends in nonsense.
-
-    Args:
-        name: What a person calls the model.
-        parts: The model, its joints and its controls.
 
     Raises:
         ModelError: MuJoCo gives up, or an acceleration is no number.
     """
-    data = mujoco.MjData(parts.model)
-    for control, start in itertools.product(parts.controls, (0.0, _ASIDE)):
-        mujoco.mj_resetData(parts.model, data)
+    name, model = cartpole.name, cartpole.model
+    data = mujoco.MjData(model)
+    for control, start in itertools.product(cartpole.controls, (0.0, _ASIDE)):
+        mujoco.mj_resetData(model, data)
         data.qpos[:], data.qvel[:], data.ctrl[0] = start, start, control
         try:
-            mujoco.mj_forward(parts.model, data)
+            mujoco.mj_forward(model, data)
         except mujoco.FatalError as error:
-            reason = " ".join(str(error).split())
-            raise ModelError(f"MuJoCo gives up on {name}: {reason}") from error
+            raise ModelError(f"MuJoCo gives up on {name}: {one_line(error)}") from error
         if not np.isfinite(data.qacc).all():
             raise ModelError(
                 f"{name} moves off with an acceleration that is NaN or infinite "

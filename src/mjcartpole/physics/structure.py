@@ -15,7 +15,8 @@ import numpy.typing as npt
 
 from mjcartpole import task
 from mjcartpole.errors import NotACartPoleError
-from mjcartpole.physics.bodies import HasJoints, mass_of, pole_bodies, subtree
+from mjcartpole.physics.bodies import data_at_zero, mass_of, pole_bodies, subtree
+from mjcartpole.physics.cartpole import CartPole, motor_of
 
 Vector = npt.NDArray[np.float64]
 
@@ -31,15 +32,16 @@ LEAST_ARM: Final = 1e-6
 LEAST_INERTIA: Final = 1e-9
 """Of any motion of several poles, relative; below it joints cannot be told apart."""
 
-_KIND: Final = {
-    mujoco.mjtJoint.mjJNT_SLIDE: "slide",
-    mujoco.mjtJoint.mjJNT_HINGE: "hinge",
-    mujoco.mjtJoint.mjJNT_BALL: "ball",
-    mujoco.mjtJoint.mjJNT_FREE: "free",
-}
+LARGEST_LEAN: Final = task.CARTPOLE_V1.theta_limit
+"""A pole that leans by more, rad, at its document's angle 0 has its angle counted from upright.
 
+The same for every task: it belongs to the document, which one task stores and another may read."""
 
 _SHOWN: Final = 6
+
+
+class UnfitError(Exception):
+    """A model is no cart-pole; says what it has in place of what is needed (see `refusal`)."""
 
 
 @dataclass(frozen=True)
@@ -49,6 +51,8 @@ class Directions:
     Attributes:
         up: The world axis that gravity points away from most (z where there is none), shape (3,).
         rail: Where a positive x goes, unit, shape (3,).
+        hinge: What a positive angle turns about, unit, shape (3,).
+        frame: Orientation of the hinge's body, shape (3, 3).
         lean: Where the top of an upright pole goes as the angle grows, shape (3,); a unit vector
             if the hinge is horizontal.
         arm: From the hinge's axis to the pole's centre of mass, across the axis, m, shape (3,).
@@ -58,6 +62,8 @@ class Directions:
 
     up: Vector
     rail: Vector
+    hinge: Vector
+    frame: Vector
     lean: Vector
     arm: Vector
     upright: float
@@ -68,62 +74,61 @@ class Directions:
         return float(self.lean @ self.rail)
 
 
-def find_joints(name: str, model: mujoco.MjModel) -> tuple[int, tuple[int, ...]]:
+def find_joints(model: mujoco.MjModel) -> tuple[int, tuple[int, ...]]:
     """Return the index of the cart's joint, and of each pole's; all have one coordinate each.
 
     Raises:
-        NotACartPoleError: There is another joint, or a hinge is not inside the cart.
+        UnfitError: There is another joint, or a hinge is not inside the cart.
     """
-    kinds = [mujoco.mjtJoint(int(kind)) for kind in model.jnt_type]
-    for kind in (mujoco.mjtJoint.mjJNT_FREE, mujoco.mjtJoint.mjJNT_BALL):
+    kinds = [_kind(model, joint) for joint in range(model.njnt)]
+    for kind in ("free", "ball"):
         if kind in kinds:
-            raise refusal(
-                name, model, f"a {_KIND[kind]} joint, that is neither the cart's nor the pole's"
-            )
+            raise UnfitError(f"a {kind} joint, that is neither the cart's nor the pole's")
     sliders, hinges = (
-        [index for index, found in enumerate(kinds) if found == kind]
-        for kind in (mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_HINGE)
+        [joint for joint, found in enumerate(kinds) if found == kind] for kind in ("slide", "hinge")
     )
     if len(sliders) != 1:
         amount = f"{len(sliders)} slide joints" if sliders else "no slide joint"
-        raise refusal(name, model, f"{amount} where one (the cart's) is needed")
+        raise UnfitError(f"{amount} where one (the cart's) is needed")
     if not hinges:
-        raise refusal(name, model, "no hinge joint where one (the pole's) is needed")
+        raise UnfitError("no hinge joint where one (the pole's) is needed")
     sliding = subtree(model, int(model.jnt_bodyid[sliders[0]]))
     for hinge in hinges:
         if model.jnt_bodyid[hinge] not in sliding:
             which = f" ('{model.joint(hinge).name or hinge}')" if len(hinges) > 1 else ""
-            raise refusal(name, model, f"a hinge{which} whose body is not inside the cart's body")
+            raise UnfitError(f"a hinge{which} whose body is not inside the cart's body")
     return sliders[0], tuple(hinges)
 
 
-def find_controls(name: str, model: mujoco.MjModel, slider: int) -> tuple[float, float]:
+def _kind(model: mujoco.MjModel, joint: int) -> str:
+    return _word(mujoco.mjtJoint(int(model.jnt_type[joint])).name)
+
+
+def _word(name: str) -> str:
+    """Return the word in one of MuJoCo's names: "slide" for mjJNT_SLIDE."""
+    return name.partition("_")[2].lower()
+
+
+def find_controls(model: mujoco.MjModel, slider: int) -> tuple[float, float]:
     """Return the controls of both actions: the ends of the motor's range, or -1 and 1.
 
     Action 1 is the one that pushes more towards positive x.
 
     Raises:
-        NotACartPoleError: There is not exactly one motor, or it cannot push in two ways.
+        UnfitError: There is not exactly one motor, or it cannot push in two ways.
     """
-    _check_motor(name, model, slider)
-    motor, low, high = motor_of(model), -1.0, 1.0
-    control = int(model.actuator_ctrladr[motor])
+    _check_motor(model, slider)
+    low, high = -1.0, 1.0
+    control = int(model.actuator_ctrladr[motor_of(model)])
     if model.actuator_ctrllimited[control]:
         low, high = (float(end) for end in model.actuator_ctrlrange[control])
     left, right = (push(model, slider, control) for control in (low, high))
     if left == right:
-        raise refusal(
-            name,
-            model,
+        raise UnfitError(
             f"a motor that pushes with {left + 0.0:g} N whatever the control, by its gear, gain "
-            "and ranges",
+            "and ranges"
         )
     return (low, high) if left < right else (high, low)
-
-
-def motor_of(model: mujoco.MjModel) -> int:
-    """Return index of the actuator that takes the one control of a model (others may take none)."""
-    return int(np.flatnonzero(model.actuator_ctrlnum)[0])
 
 
 def push(model: mujoco.MjModel, slider: int, control: float) -> float:
@@ -143,37 +148,28 @@ def push(model: mujoco.MjModel, slider: int, control: float) -> float:
     return force
 
 
-def _check_motor(name: str, model: mujoco.MjModel, slider: int) -> None:
+def _check_motor(model: mujoco.MjModel, slider: int) -> None:
     if model.nu != 1:
         idle = " with a control input" if model.nactuator > model.nu else ""
         amount = f"{model.nu} actuators{idle}" if model.nu else f"no actuator{idle}"
-        raise refusal(name, model, f"{amount} where one plain motor is needed")
+        raise UnfitError(f"{amount} where one plain motor is needed")
     motor = motor_of(model)
     transmission = mujoco.mjtTrn(int(model.actuator_trntype[motor]))
     on_joint = transmission in {mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT}
     if not on_joint or model.actuator_trnid[motor, 0] != slider:
-        word = transmission.name.removeprefix("mjTRN_").lower()
-        what = "another joint" if on_joint else f"a {word}"
-        raise refusal(
-            name,
-            model,
-            f"an actuator that does not push along the slide joint (it acts on {what})",
+        what = "another joint" if on_joint else f"a {_word(transmission.name)}"
+        raise UnfitError(
+            f"an actuator that does not push along the slide joint (it acts on {what})"
         )
     if model.na or model.actuator_dyntype[motor] != mujoco.mjtDyn.mjDYN_NONE:
         active = int(np.flatnonzero(model.actuator_actnum)[0]) if model.na else motor
-        kind = mujoco.mjtDyn(int(model.actuator_dyntype[active])).name
-        kind = kind.removeprefix("mjDYN_").lower()
-        raise refusal(
-            name, model, f"an actuator with activation states ({kind}) instead of a plain motor"
-        )
-    fixed = model.actuator_gaintype[motor] == mujoco.mjtGain.mjGAIN_FIXED
-    if not fixed and not _is_fixed_gain(model, motor):
-        raise refusal(name, model, "an actuator whose force is not in proportion to its control")
-
-
-def _is_fixed_gain(model: mujoco.MjModel, motor: int) -> bool:
-    affine = model.actuator_gaintype[motor] == mujoco.mjtGain.mjGAIN_AFFINE
-    return bool(affine and not model.actuator_gainprm[motor, 1:3].any())
+        kind = _word(mujoco.mjtDyn(int(model.actuator_dyntype[active])).name)
+        raise UnfitError(f"an actuator with activation states ({kind}) instead of a plain motor")
+    kind_of_gain = model.actuator_gaintype[motor]
+    affine = kind_of_gain == mujoco.mjtGain.mjGAIN_AFFINE
+    varies = not affine or model.actuator_gainprm[motor, 1:3].any()
+    if kind_of_gain != mujoco.mjtGain.mjGAIN_FIXED and varies:
+        raise UnfitError("an actuator whose force is not in proportion to its control")
 
 
 def is_servo(model: mujoco.MjModel) -> bool:
@@ -189,50 +185,47 @@ def find_substeps(name: str, model: mujoco.MjModel) -> int:
     Raises:
         NotACartPoleError: The timestep does not divide it, or there would be too many.
     """
-    timestep = float(model.opt.timestep)
-    substeps = round(task.CONTROL_STEP / timestep)
+    timestep, step = float(model.opt.timestep), task.CONTROL_STEP
+    substeps = round(step / timestep)
     if substeps > MOST_SUBSTEPS:
         raise NotACartPoleError(
             f"{name}: timestep {timestep:g} s makes {substeps:g} physics steps of one control step "
-            f"of {task.CONTROL_STEP} s, and no more than {MOST_SUBSTEPS} are done; use 0.001 …"
+            f"of {step} s, and no more than {MOST_SUBSTEPS} are done; use 0.001 …"
         )
-    if substeps < 1 or abs(substeps * timestep - task.CONTROL_STEP) > 1e-12:
+    if substeps < 1 or abs(substeps * timestep - step) > 1e-12:
         raise NotACartPoleError(
-            f"{name}: timestep {timestep:g} s does not divide the control step of "
-            f"{task.CONTROL_STEP} s; use 0.02, 0.01, 0.005, 0.002 …, or take the file's own as the "
-            "control step (--own-timestep, own_timestep=True)"
+            f"{name}: timestep {timestep:g} s does not divide the control step of {step} s; "
+            "use 0.02, 0.01, 0.005, 0.002 …, or take the file's own as the control step "
+            "(--own-timestep, own_timestep=True)"
         )
     return substeps
 
 
-def directions(parts: HasJoints, pole: int = 0) -> Directions:
+def directions(cartpole: CartPole, pole: int = 0) -> Directions:
     """Return where the cart and one pole point when all coordinates are 0."""
-    model, slider, hinge = parts.model, parts.slider, parts.hinges[pole]
-    data = mujoco.MjData(model)
-    data.qpos[:] = 0.0
-    mujoco.mj_kinematics(model, data)
-    axis = data.xaxis[hinge]
-    arm = _centre(parts, pole, data) - data.xanchor[hinge]
+    model, joint = cartpole.model, cartpole.hinges[pole]
+    data = data_at_zero(model)
+    axis = data.xaxis[joint].copy()
+    arm = _centre(cartpole, pole, data) - data.xanchor[joint]
     arm = arm - (arm @ axis) * axis
-    up = _up(model.opt.gravity)
-    lean = np.cross(axis, up)
-    angle = 0.0
+    up, angle = _up(model.opt.gravity), 0.0
     if np.linalg.norm(arm) >= LEAST_ARM:
         # From where the arm points to where `up` does, about the axis.
         angle = math.atan2(float(axis @ np.cross(arm, up)), float(arm @ up))
-    return Directions(up, data.xaxis[slider].copy(), lean, arm, angle)
+    rail, frame = data.xaxis[cartpole.slider].copy(), data.xmat[model.jnt_bodyid[joint]]
+    return Directions(up, rail, axis, frame.reshape(3, 3).copy(), np.cross(axis, up), arm, angle)
 
 
-def _centre(parts: HasJoints, pole: int, data: mujoco.MjData) -> Vector:
+def _centre(cartpole: CartPole, pole: int, data: mujoco.MjData) -> Vector:
     """Return a pole's centre of mass in the world, m, shape (3,)."""
-    model, bodies = parts.model, pole_bodies(parts, pole)
+    model, bodies = cartpole.model, pole_bodies(cartpole, pole)
     if mass_of(model, bodies) > 0:
         weights = model.body_mass[bodies]
         centre: Vector = weights @ data.xipos[bodies] / weights.sum()
         return centre
     # Nothing weighs but what stands on it, or nothing at all.
     mujoco.mj_comPos(model, data)
-    whole: Vector = data.subtree_com[model.jnt_bodyid[parts.hinges[pole]]]
+    whole: Vector = data.subtree_com[model.jnt_bodyid[cartpole.hinges[pole]]]
     return whole
 
 
@@ -245,119 +238,96 @@ def _up(gravity: Vector) -> Vector:
     return up
 
 
-def check_directions(name: str, parts: HasJoints, pole: int = 0) -> Directions:
-    """Refuse a pole that no push along the rail tilts, and a wheel among several poles.
+def count_from_upright(cartpole: CartPole, pole: int) -> float:
+    """Have a pole's angle count from upright, if it does not; return the angle that became 0, rad.
+
+    It is what the attribute `ref` does in a document: the pose stays, its coordinate moves, in
+    place. No derived value of the model depends on it. Of angles a full turn apart it is one
+    inside the joint's limits.
 
     Raises:
-        NotACartPoleError: As said; the reason is named.
+        UnfitError: No push tilts the pole, or something else in the model counts by the old angle.
     """
-    found, which = directions(parts, pole), _which(parts, pole)
-    if abs(found.rail @ found.up) > 1 - LEAST_COUPLING**2:
-        reason = "a slide joint that goes up and down, not along a rail"
-    elif np.linalg.norm(found.lean) < LEAST_COUPLING:
-        reason = f"a hinge{which} that turns about the vertical"
-    elif abs(found.coupling) < LEAST_COUPLING:
-        reason = f"a hinge{which} whose axis is along the rail, so a push does not tilt the pole"
-    elif len(parts.hinges) > 1 and np.linalg.norm(found.arm) < LEAST_ARM:
-        reason = f"a hinge{which} that turns about its own centre of mass, as a wheel and no pole"
-    else:
-        return found
-    raise refusal(name, parts.model, reason)
-
-
-def _which(parts: HasJoints, pole: int) -> str:
-    """Return a hinge's name in brackets where there are several."""
-    if len(parts.hinges) == 1:
-        return ""
-    return f" ('{parts.model.joint(parts.hinges[pole]).name or f'number {pole + 1}'}')"
-
-
-def check_independent(name: str, parts: HasJoints) -> None:
-    """Refuse several hinges of which one adds no motion of its own.
-
-    Raises:
-        NotACartPoleError: The inertia of all joints together is singular.
-    """
-    model = parts.model
-    if len(parts.hinges) == 1:
-        return
-    data, inertia = mujoco.MjData(model), np.empty((model.nv, model.nv))
-    data.qpos[:] = 0.0
-    mujoco.mj_fwdPosition(model, data)
-    mujoco.mj_fullM(model, data, inertia)
-    scale = np.sqrt(np.maximum(inertia.diagonal(), mujoco.mjMINVAL))
-    if np.linalg.eigvalsh(inertia / np.outer(scale, scale))[0] < LEAST_INERTIA:
-        raise refusal(name, model, "hinges that turn alike, or poles without mass")
-
-
-def count_from_upright(name: str, parts: HasJoints, pole: int, upright: float) -> float:
-    """Return change, in place, from where a compiled model counts the hinge's angle.
-
-    It is what the attribute `ref` does in a document: the pose stays, its coordinate moves. No
-    derived value of the model depends on it.
-
-    Args:
-        name: What a person calls the model.
-        parts: The model and its joints.
-        pole: Which pole.
-        upright: The angle that becomes 0, rad; of those a full turn apart, one inside the limits.
-
-    Returns:
-        The angle that became 0, rad.
-
-    Raises:
-        NotACartPoleError: Something else in the model counts by the old angle.
-    """
-    model, hinge = parts.model, parts.hinges[pole]
-    upright = _within_limits(model, hinge, upright)
+    upright = _checked_directions(cartpole, pole).upright
+    if abs(upright) <= LARGEST_LEAN:
+        return 0.0
+    model, hinge = cartpole.model, cartpole.hinges[pole]
+    if model.jnt_limited[hinge]:
+        low, high = model.jnt_range[hinge]
+        turns = (upright, upright + 2 * math.pi, upright - 2 * math.pi)
+        upright = next((angle for angle in turns if low <= angle <= high), upright)
     if model.ntendon or model.nplugin:
-        raise refusal(
-            name,
-            model,
+        raise UnfitError(
             f"a pole that stands upright at {math.degrees(upright):.4g} degrees instead of 0, with "
-            "tendons or plugins that count its angle",
+            "tendons or plugins that count its angle"
         )
-    model.qpos0[hinge] -= upright
-    model.qpos_spring[hinge] -= upright
-    model.jnt_range[hinge] -= upright
+    for counted in (model.qpos0, model.qpos_spring, model.jnt_range):
+        counted[hinge] -= upright
     model.key_qpos[:, hinge] -= upright
     return upright
 
 
-def _within_limits(model: mujoco.MjModel, hinge: int, angle: float) -> float:
-    low, high = model.jnt_range[hinge]
-    for turned in (angle, angle + 2 * math.pi, angle - 2 * math.pi):
-        if not model.jnt_limited[hinge] or low <= turned <= high:
-            return turned
-    return angle
+def _checked_directions(cartpole: CartPole, pole: int) -> Directions:
+    """Refuse a pole that no push along the rail tilts, and a wheel among several poles."""
+    found, several = directions(cartpole, pole), cartpole.poles > 1
+    name = cartpole.model.joint(cartpole.hinges[pole]).name or f"number {pole + 1}"
+    which = f" ('{name}')" if several else ""
+    if abs(found.rail @ found.up) > 1 - LEAST_COUPLING**2:
+        raise UnfitError("a slide joint that goes up and down, not along a rail")
+    if np.linalg.norm(found.lean) < LEAST_COUPLING:
+        raise UnfitError(f"a hinge{which} that turns about the vertical")
+    if abs(found.coupling) < LEAST_COUPLING:
+        raise UnfitError(
+            f"a hinge{which} whose axis is along the rail, so a push does not tilt the pole"
+        )
+    if several and np.linalg.norm(found.arm) < LEAST_ARM:
+        raise UnfitError(
+            f"a hinge{which} that turns about its own centre of mass, as a wheel and no pole"
+        )
+    return found
 
 
-def check_limits(name: str, parts: HasJoints) -> None:
+def check_independent(cartpole: CartPole) -> None:
+    """Refuse several hinges of which one adds no motion of its own.
+
+    Raises:
+        UnfitError: The inertia of all joints together is singular.
+    """
+    if cartpole.poles == 1:
+        return
+    model = cartpole.model
+    data, inertia = data_at_zero(model), np.empty((model.nv, model.nv))
+    mujoco.mj_fwdPosition(model, data)
+    mujoco.mj_fullM(model, data, inertia)
+    scale = np.sqrt(np.maximum(inertia.diagonal(), mujoco.mjMINVAL))
+    if np.linalg.eigvalsh(inertia / np.outer(scale, scale))[0] < LEAST_INERTIA:
+        raise UnfitError("hinges that turn alike, or poles without mass")
+
+
+def check_limits(cartpole: CartPole) -> None:
     """Refuse joints whose limits keep them from position 0, where episodes start.
 
     Raises:
-        NotACartPoleError: As said.
+        UnfitError: As said.
     """
-    model = parts.model
-    for joint in (parts.slider, *parts.hinges):
-        on_rail = joint == parts.slider
+    model = cartpole.model
+    for joint in cartpole.joints:
+        on_rail = joint == cartpole.slider
         place, unit = ("x = 0", "m") if on_rail else ("the upright position", "rad")
         low, high = model.jnt_range[joint]
         if model.jnt_limited[joint] and not low <= 0.0 <= high:
             label = model.joint(joint).name or f"number {joint}"
-            raise refusal(
-                name,
-                model,
+            raise UnfitError(
                 f"a range from {low:g} to {high:g} {unit} of joint '{label}' that leaves out "
-                f"{place}",
+                f"{place}"
             )
 
 
-def refusal(name: str, model: mujoco.MjModel, found: str) -> NotACartPoleError:
+def refusal(name: str, model: mujoco.MjModel, found: UnfitError) -> NotACartPoleError:
     """Return the error that says what a model has instead of what a cart-pole needs."""
     joints = [
-        f"{model.joint(index).name or 'unnamed'} ({_KIND[mujoco.mjtJoint(int(kind))]})"
-        for index, kind in enumerate(model.jnt_type[:_SHOWN])
+        f"{model.joint(joint).name or 'unnamed'} ({_kind(model, joint)})"
+        for joint in range(min(model.njnt, _SHOWN))
     ]
     actuators = [
         mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_ACTUATOR, index) or "unnamed"

@@ -8,6 +8,7 @@ import mujoco
 from mjcartpole.errors import ConfigError, ModelSyntaxError
 from mjcartpole.physics.edit.document import Document, Element
 from mjcartpole.physics.edit.element_path import label_of
+from mjcartpole.physics.library import one_line
 
 
 def number_text(value: float, written: str = "") -> str:
@@ -96,8 +97,9 @@ class Parts:
         try:
             return mujoco.MjSpec.from_string(self.document.text)
         except ValueError as error:
-            reason = " ".join(str(error).split())
-            raise ModelSyntaxError(f"the edited document is not a valid MJCF: {reason}") from error
+            raise ModelSyntaxError(
+                f"the edited document is not a valid MJCF: {one_line(error)}"
+            ) from error
 
     def put(self, element: Element, name: str, values: Sequence[float]) -> None:
         """Write numbers into an attribute; those that do not change keep their spelling.
