@@ -1,0 +1,186 @@
+"""The project's own files agree, and what CONTRIBUTING.md quotes is the real code."""
+
+import re
+import runpy
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mjcartpole.errors import RenderError
+from mjcartpole.learning.methods import METHODS
+from mjcartpole.media.scene import Scene
+from mjcartpole.physics.load import load_model
+
+ROOT = Path(__file__).resolve().parents[1]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+METHODS_FOLDER = "src/mjcartpole/learning/methods"
+GITHUB = sorted(path.relative_to(ROOT).as_posix() for path in (ROOT / ".github").rglob("*.yml"))
+YAML = [*GITHUB, "CITATION.cff", ".pre-commit-config.yaml"]
+CUT = re.compile(r"^[ +]*…\n", re.MULTILINE)
+
+
+def read(name):
+    return (ROOT / name).read_text(encoding="utf-8")
+
+
+def parse(name):
+    yaml = pytest.importorskip("yaml", reason="PyYAML comes with the extra `dev`")
+    return yaml.safe_load(read(name))
+
+
+def declared():
+    """Names and requirements of all that pyproject.toml declares."""
+    extras = PROJECT["project"]["optional-dependencies"].values()
+    needed = [*PROJECT["project"]["dependencies"], *(one for extra in extras for one in extra)]
+    return {plain(re.match(r"[\w.-]+", one)[0]): one for one in needed}
+
+
+def plain(name):
+    return re.sub(r"[-_.]+", "-", name).lower()
+
+
+def pinned(name):
+    lines = [line for line in read(name).splitlines() if not line.startswith("#")]
+    matches = [re.fullmatch(r"([\w.-]+)==([\w.]+)(; .*)?", line) for line in lines]
+    assert all(matches), lines
+    return {plain(match[1]): match[2] for match in matches}
+
+
+@pytest.mark.parametrize("name", YAML)
+def test_it_is_yaml(name):
+    assert isinstance(parse(name), dict)
+
+
+@pytest.mark.parametrize("name", YAML)
+def test_its_indents_are_spaces_by_twos(name):
+    for number, line in enumerate(read(name).splitlines(), 1):
+        indent = re.match(r"\s*", line)[0]
+        assert set(indent) <= {" "}, f"{name}:{number}"
+        assert len(indent) % 2 == 0 and line == line.rstrip(), f"{name}:{number}"
+
+
+@pytest.mark.parametrize("name", [name for name in GITHUB if "workflows" in name])
+def test_a_workflow_may_only_read_unless_it_publishes(name):
+    workflow = parse(name)
+    assert workflow["permissions"] == {"contents": "read"}
+    rights = {job: of["permissions"] for job, of in workflow["jobs"].items() if "permissions" in of}
+    assert rights == ({"publish": {"id-token": "write"}} if "release" in name else {})
+    for job in workflow["jobs"].values():
+        assert job["timeout-minutes"] and job["steps"]
+
+
+@pytest.mark.parametrize("name", [name for name in GITHUB if "workflows" in name])
+def test_what_a_workflow_names_is_there(name):
+    text = read(name)
+    named = re.findall(r"constraints/\w+\.txt|tests/\w+\.py|(?<=- run: )make [\w-]+", text)
+    for one in named:
+        if one.startswith("make "):
+            assert re.search(rf"^{one.split()[1]}:", read("Makefile"), re.MULTILINE), one
+        else:
+            assert (ROOT / one).is_file(), one
+
+
+def test_tests_run_on_every_system_python_and_mujoco():
+    matrix = parse(".github/workflows/test.yml")["jobs"]["everywhere"]["strategy"]["matrix"]
+    assert [system.split("-")[0] for system in matrix["os"]] == ["ubuntu", "macos", "windows"]
+    assert matrix["python"] == ["3.11", "3.12", "3.13", "3.14"]
+    assert PROJECT["project"]["requires-python"] == f">={matrix['python'][0]}"
+    assert declared()["mujoco"].startswith(f"mujoco>={matrix['mujoco'][0]}")
+
+
+def test_pre_commit_takes_the_versions_of_ci():
+    text, versions = read(".pre-commit-config.yaml"), pinned("constraints/ci.txt")
+    found = dict(re.findall(r"repo: https://github\.com/[\w-]+/([\w-]+)\n +rev: v([\d.]+)", text))
+    assert found == {"ruff-pre-commit": versions["ruff"], "codespell": versions["codespell"]}
+    assert re.findall(r"- id: ([\w-]+)", text) == ["ruff-check", "ruff-format", "codespell", "mypy"]
+
+
+def test_ci_pins_every_declared_dependency_and_names_no_place():
+    versions = pinned("constraints/ci.txt")
+    assert sorted(set(declared()) - set(versions)) == []
+
+
+def test_the_lowest_versions_are_those_declared():
+    made = runpy.run_path(str(ROOT / "scripts" / "lowest_versions.py"))["lowest"]()
+    assert made == read("constraints/lowest.txt"), "run: python scripts/lowest_versions.py"
+    assert set(pinned("constraints/lowest.txt")) == set(declared())
+
+
+def test_the_citation_is_of_this_version():
+    version = PROJECT["project"]["version"]
+    assert re.findall(r"^version: (.*)$", read("CITATION.cff"), re.MULTILINE) == [version]
+    assert re.findall(r"^license: (.*)$", read("CITATION.cff"), re.MULTILINE) == [
+        PROJECT["project"]["license"]
+    ]
+
+
+def test_the_source_distribution_has_what_is_there():
+    included = PROJECT["tool"]["hatch"]["build"]["targets"]["sdist"]["include"]
+    assert [name for name in included if not (ROOT / name.lstrip("/")).exists()] == []
+    kept = {".gitignore", "videos", "pyproject.toml"}  # which a sdist need not have, or always has
+    names = {path.name for path in ROOT.iterdir() if path.suffix in {".md", ".cff", ".yaml"}}
+    assert {f"/{name}" for name in names - kept} <= set(included)
+
+
+def quotes():
+    """Yield kind, file and text of every block of CONTRIBUTING.md that has a title."""
+    found = re.findall(r"^```(\w+) (.+)\n((?s:.*?))^```$", read("CONTRIBUTING.md"), re.MULTILINE)
+    return [pytest.param(*one, id=f"{number}-{one[1]}") for number, one in enumerate(found)]
+
+
+def scratch(title):
+    """Run a complete example of CONTRIBUTING.md; return what it defines."""
+    code = next(quote.values[2] for quote in quotes() if quote.values[1] == f"example: {title}")
+    names = {"__name__": "scratch"}
+    exec(compile(code, f"CONTRIBUTING.md, {title}", "exec"), names)
+    return names
+
+
+@pytest.mark.parametrize(("kind", "name", "text"), quotes())
+def test_what_is_quoted_is_the_code(kind, name, text):
+    if name.startswith("example: "):
+        return
+    code, before = read(name), ""
+    if kind == "diff":
+        before = "".join(line[1:] for line in text.splitlines(True) if line.startswith("-"))
+        kept = "".join(line for line in text.splitlines(True) if not line.startswith("-"))
+        text = re.sub(r"^[ +]", "", kept, flags=re.MULTILINE)
+    assert not before or before not in code
+    place = 0
+    for piece in CUT.split(text):
+        place = code.find(piece, place)
+        assert place >= 0, f"{name} has not, in this order:\n{piece}"
+        place += len(piece)
+
+
+@pytest.mark.parametrize("method", ["sarsa", "expected_sarsa"])
+def test_the_methods_are_shown_whole(method):
+    name = f"{METHODS_FOLDER}/{method}.py"
+    shown = {quote.values[1]: quote.values[2] for quote in quotes()}
+    assert shown[name] == read(name)
+    assert (ROOT / "tests" / "learning" / "methods" / f"test_{method}.py").is_file()
+    assert method.replace("_", "-") in METHODS
+
+
+def test_every_file_that_contributing_names_is_there():
+    names = re.findall(
+        r"`((?:src|tests|docs|scripts|constraints)/[\w./]*)`", read("CONTRIBUTING.md")
+    )
+    assert len(names) > 10
+    missing = {name for name in names if not (ROOT / name).exists()}
+    assert missing == {"tests/media/test_scope.py"}  # of the example
+
+
+def test_the_renderer_of_the_example_draws():
+    renderer = scratch("a renderer")["ScopeRenderer"](Scene(load_model(), 80, 60, "side", "draft"))
+    with renderer:
+        frame = renderer.render((0.0, 0.0, 0.0, 0.0))
+        assert frame.shape == (60, 80, 3)
+        assert np.argwhere(frame.any(axis=2)).tolist() == [[30, 40]]
+        right = renderer.render((2.3, 0.0, -0.2, 0.0))
+        (row, column), *rest = np.argwhere(right.any(axis=2)).tolist()
+        assert row > 50 and column > 70 and rest == []
+    with pytest.raises(RenderError, match="closed"):
+        renderer.render((0.0, 0.0, 0.0, 0.0))
