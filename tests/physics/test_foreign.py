@@ -118,18 +118,27 @@ def test_dm_controls_cart_pole_is_understood():
         "joint 'slider' of body 'cart'",
         "joint 'hinge_1' of body 'pole_1'",
     )
-    assert (found.forces, found.timestep, found.substeps) == ((-10.0, 10.0), 0.01, 2)
-    assert (found.rail, found.up, pole.leans, found.integrator) == ("+x", "+z", 1, "RK4")
+    assert (found.forces, found.cartpole.timestep, found.cartpole.substeps) == (
+        (-10.0, 10.0),
+        0.01,
+        2,
+    )
+    assert (found.rail, found.up, pole.leans, found.cartpole.integrator) == ("+x", "+z", 1, "RK4")
     assert (found.cart_mass, pole.mass, pole.com_distance) == pytest.approx((1, 0.1, 0.5))
     assert found.rail_limits == (-1.8, 1.8)
-    assert found.beyond == ()
+    assert found.beyond == []
 
 
 def test_gymnasiums_inverted_pendulum_is_understood():
     needs(GYMNASIUM)
     found = describe(load_model(GYMNASIUM))
-    assert (found.forces, found.substeps, found.integrator) == ((-300.0, 300.0), 1, "RK4")
-    assert (found.gear, found.controls) == (100.0, (-3.0, 3.0))
+    assert (found.forces, found.cartpole.substeps, found.cartpole.integrator) == (
+        (-300.0, 300.0),
+        1,
+        "RK4",
+    )
+    assert found.cartpole.controls == (-3.0, 3.0)
+    assert any("gear 100)" in line for line in found.text())
     assert found.poles[0].balance == pytest.approx(-0.001 / 0.6, rel=1e-3)
     assert found.rail_limits == (-1.0, 1.0)
 
@@ -248,7 +257,7 @@ def test_a_hinge_whose_range_is_infinite_turns_freely():
     """As people write it, `limited` by a default."""
     free = document().replace('name="h"', 'name="h" limited="true" range="-inf inf"')
     cartpole = load_model(free)
-    assert describe(cartpole).equations_apply
+    assert not describe(cartpole).beyond
     simulation, plain = (Simulation(load_model(each)) for each in (free, document()))
     for each in (simulation, plain):
         each.state = (0.0, 0.0, 3.0, 9.0)

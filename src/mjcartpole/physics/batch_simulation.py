@@ -11,10 +11,10 @@ import numpy as np
 import numpy.typing as npt
 from mujoco import batch as mujoco_batch
 
-from mjcartpole.errors import ConfigError, SimulationError
+from mjcartpole.errors import ConfigError
 from mjcartpole.integrator import Integrator, check_integrator
-from mjcartpole.physics.cartpole import CartPole
-from mjcartpole.physics.simulation import LARGEST_SANE, check_sane, stepping_model
+from mjcartpole.physics.cartpole import CartPole, Vector
+from mjcartpole.physics.simulation import LARGEST_SANE, check_sane, gave_up, stepping_model
 
 _SHARE: Final = 4
 """Physics steps per control step that are worth a thread of their own, at the least."""
@@ -99,7 +99,7 @@ class BatchSimulation:
         """How many threads step at present."""
         return int(self._batch.nthread)
 
-    def set_state(self, ids: npt.NDArray[np.intp] | slice, states: npt.NDArray[np.float64]) -> None:
+    def set_state(self, ids: npt.NDArray[np.intp] | slice, states: Vector) -> None:
         """Put some cart-poles into states, one row each; nothing of their past remains."""
         if self._is_remembering:
             everyone = np.arange(len(self.state))
@@ -111,7 +111,7 @@ class BatchSimulation:
             qpos[ids], qvel[ids] = states[:, 2 * joint], states[:, 2 * joint + 1]
         self.state[ids] = states
 
-    def step(self, controls: npt.NDArray[np.float64]) -> None:
+    def step(self, controls: Vector) -> None:
         """Advance one control step.
 
         Args:
@@ -128,15 +128,14 @@ class BatchSimulation:
             else:
                 self._own_integrator()
         except mujoco_batch.SimulationError as error:
-            reason = " ".join(str(error).split())
-            raise SimulationError(f"MuJoCo gave up on {self.cartpole.name}: {reason}") from error
+            raise gave_up(self.cartpole, error) from error
         if self._other:
             self._laps.append(time.perf_counter() - started)
             self._until_choice -= 1
             if not self._until_choice:
                 self._choose(self._other)
 
-    def sizes(self) -> npt.NDArray[np.float64]:
+    def sizes(self) -> Vector:
         """Return absolute values of `state`; the next call overwrites them.
 
         Raises:

@@ -5,12 +5,17 @@ import dataclasses
 import functools
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeAlias
 
 import mujoco
 import numpy as np
+import numpy.typing as npt
 
 from mjcartpole.physics.includes import portable
 from mjcartpole.task import CONTROL_STEP, in_words
+
+Vector: TypeAlias = npt.NDArray[np.float64]
+"""Numbers, vectors and matrices in float64."""
 
 INTEGRATORS = {
     int(value): {"EULER": "Euler", "RK4": "RK4"}.get(

@@ -2,15 +2,16 @@
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Final
 
 import mujoco
 import numpy as np
 
 from mjcartpole.physics.bodies import cart_bodies, mass_of, pole_bodies
-from mjcartpole.physics.cartpole import CartPole
+from mjcartpole.physics.cartpole import CartPole, Vector
 from mjcartpole.physics.file_steps import method_of
-from mjcartpole.physics.structure import LEAST_ARM, Directions, Vector, directions, is_servo, push
+from mjcartpole.physics.structure import LEAST_ARM, directions, is_servo, push
 from mjcartpole.physics.unmodelled_effects import beyond_equations, beyond_step
 from mjcartpole.task import CARTPOLE_V1, Task
 
@@ -64,103 +65,83 @@ class PoleDescription:
         return words
 
 
-@dataclass(frozen=True)
 class Description:
     """A cart-pole in a person's words and numbers; `text()` has it in lines.
 
     Attributes:
-        name: What a person calls the model.
+        cartpole: The model.
         cart: The slide joint and its body.
+        cart_mass: All that slides but does not turn, kg.
         poles: One description each, in the order of the state's values.
         rail: World axis of the rail, where positive x goes: `"+x"`, `"-y"`, or three numbers.
         up: World axis that gravity points away from: `"+z"`.
-        gravity: m/s^2, shape (3,).
-        forces: Push along the rail by action 0 and by action 1 at rest, N.
-        servo: Whether the force depends on position or velocity too; `forces` are those at x = 0.
-        gear: The actuator's.
-        controls: Of action 0 and of action 1.
-        timestep: Of one physics step, s.
-        substeps: Physics steps per control step.
-        integrator: As the document names it.
-        cart_mass: All that slides but does not turn, kg.
+        forces: Push along the rail by action 0 and by action 1 at rest at x = 0, N.
         rail_limits: Ends of the rail, m; None without.
-        x_limit: How far from its middle an episode ends, m.
         beyond: What acts on the motion and is not in the closed-form equations; empty where
             they apply.
-        beyond_step: Why one step of the file's own integrator is not the equations' own.
     """
 
-    name: str
-    cart: str
-    poles: tuple[PoleDescription, ...]
-    rail: str
-    up: str
-    gravity: tuple[float, float, float]
-    forces: tuple[float, float]
-    servo: bool
-    gear: float
-    controls: tuple[float, float]
-    timestep: float
-    substeps: int
-    integrator: str
-    cart_mass: float
-    rail_limits: tuple[float, float] | None
-    x_limit: float
-    beyond: tuple[str, ...]
-    beyond_step: tuple[str, ...]
+    def __init__(self, cartpole: CartPole, task: Task) -> None:
+        """Look at a model; `task` says what ends an episode."""
+        self.cartpole, self._task = cartpole, task
+        model, slider = cartpole.model, cartpole.slider
+        found = directions(cartpole)
+        self.rail, self.up = axis_name(found.rail), axis_name(found.up)
+        self.cart = _joint(model, slider)
+        self.cart_mass = mass_of(model, cart_bodies(cartpole))
+        self.poles = tuple(_pole(cartpole, pole) for pole in range(cartpole.poles))
+        self.forces = tuple(push(model, slider, control) for control in cartpole.controls)
+        low, high = model.jnt_range[slider].tolist()
+        has_ends = model.jnt_limited[slider] and (math.isfinite(low) or math.isfinite(high))
+        self.rail_limits = (low, high) if has_ends else None
+        self.beyond = beyond_equations(cartpole, task=task)
 
-    @property
-    def control_step(self) -> float:
-        """Seconds between two actions."""
-        return self.timestep * self.substeps
-
-    @property
-    def equations_apply(self) -> bool:
-        """Whether the closed-form equations cover the motion."""
-        return not self.beyond
+    @cached_property
+    def beyond_step(self) -> list[str]:
+        """Why one step of the file's own integrator is not the equations' own."""
+        method = method_of(self.cartpole)
+        return beyond_step(self.cartpole, method, self.beyond, task=self._task)
 
     def text(self) -> list[str]:
         """Return the description in lines, each with a label."""
+        several = len(self.poles) > 1
+        poles = [(f" {i}" if several else "", pole) for i, pole in enumerate(self.poles, start=1)]
+        gravity = _numbers(self.cartpole.model.opt.gravity)
         lines = [
             ("cart", f"{self.cart}, {self.cart_mass:.6g} kg"),
-            *((f"pole{number}", pole.what()) for number, pole in self._numbered()),
+            *((f"pole{number}", pole.what()) for number, pole in poles),
             ("rail", f"along {self.rail}{self._limits()}"),
-            ("up", f"{self.up}; gravity {_numbers(self.gravity)} m/s^2"),
-            *((f"angle{number}", pole.angle()) for number, pole in self._numbered()),
+            ("up", f"{self.up}; gravity {gravity} m/s^2"),
+            *((f"angle{number}", pole.angle()) for number, pole in poles),
             ("force", self._force()),
             ("time", self._time()),
-            ("integrator", self.integrator),
+            ("integrator", self.cartpole.integrator),
             ("equations", self._equations()),
         ]
         return [f"{label:<{_LABEL_WIDTH}}{words}" for label, words in lines]
 
-    def _numbered(self) -> list[tuple[str, PoleDescription]]:
-        """Return each pole with what tells it from the others; nothing where there is one."""
-        if len(self.poles) == 1:
-            return [("", self.poles[0])]
-        return [(f" {number}", pole) for number, pole in enumerate(self.poles, start=1)]
-
     def _limits(self) -> str:
         if self.rail_limits is None:
-            ends = math.isfinite(self.x_limit)
-            return ", no ends" + (f"; an episode ends at {self.x_limit:g} m" if ends else "")
+            limit = self._task.x_limit
+            return ", no ends" + f"; an episode ends at {limit:g} m" * math.isfinite(limit)
         low, high = self.rail_limits
         return f", ends at {low:g} m and {high:g} m"
 
     def _force(self) -> str:
-        (left, right), (low, high) = self.forces, self.controls
-        servo = " at rest at x = 0, by a servo" if self.servo else ""
+        model, (left, right), (low, high) = self.cartpole.model, self.forces, self.cartpole.controls
+        servo = " at rest at x = 0, by a servo" if is_servo(model) else ""
         return (
             f"action 0: {left:g} N, action 1: {right:g} N{servo} "
-            f"(control {low:g} or {high:g}, gear {self.gear:g})"
+            f"(control {low:g} or {high:g}, gear {model.actuator_gear[self.cartpole.motor, 0]:g})"
         )
 
     def _time(self) -> str:
-        steps = "step" if self.substeps == 1 else "steps"
-        return f"{self.substeps} {steps} of {self.timestep:g} s per action, {self.control_step:g} s"
+        of = self.cartpole
+        steps = "step" if of.substeps == 1 else "steps"
+        return f"{of.substeps} {steps} of {of.timestep:g} s per action, {of.control_step:g} s"
 
     def _equations(self) -> str:
-        if not self.equations_apply:
+        if self.beyond:
             more = len(self.beyond) - _SHOWN
             shown = [*self.beyond[:_SHOWN], *([f"and {more} more"] if more > 0 else [])]
             return f"do not apply: {'; '.join(shown)}"
@@ -170,41 +151,12 @@ class Description:
 
 
 def describe(cartpole: CartPole, *, task: Task = CARTPOLE_V1) -> Description:
-    """Say what was understood of a model.
-
-    Args:
-        cartpole: A loaded model.
-        task: What ends an episode.
-    """
-    model, slider = cartpole.model, cartpole.slider
-    found = [directions(cartpole, pole) for pole in range(cartpole.poles)]
-    low, high = (push(model, slider, control) for control in cartpole.controls)
-    limits = [float(end) for end in model.jnt_range[slider]]
-    has_ends = model.jnt_limited[slider] and np.isfinite(limits).any()
-    beyond = beyond_equations(cartpole, task=task)
-    return Description(
-        name=cartpole.name,
-        cart=_joint(model, slider),
-        poles=tuple(_pole(cartpole, pole, found[pole]) for pole in range(cartpole.poles)),
-        rail=axis_name(found[0].rail),
-        up=axis_name(found[0].up),
-        gravity=tuple(model.opt.gravity.tolist()),
-        forces=(low, high),
-        servo=is_servo(model),
-        gear=float(model.actuator_gear[cartpole.motor, 0]),
-        controls=cartpole.controls,
-        timestep=cartpole.timestep,
-        substeps=cartpole.substeps,
-        integrator=cartpole.integrator,
-        cart_mass=mass_of(model, cart_bodies(cartpole)),
-        rail_limits=(limits[0], limits[1]) if has_ends else None,
-        x_limit=task.x_limit,
-        beyond=tuple(beyond),
-        beyond_step=tuple(beyond_step(cartpole, method_of(cartpole), beyond, task=task)),
-    )
+    """Say what was understood of a model, and where a task's episodes end on it."""
+    return Description(cartpole, task)
 
 
-def _pole(cartpole: CartPole, pole: int, found: Directions) -> PoleDescription:
+def _pole(cartpole: CartPole, pole: int) -> PoleDescription:
+    found = directions(cartpole, pole)
     return PoleDescription(
         joint=_joint(cartpole.model, cartpole.hinges[pole]),
         mass=mass_of(cartpole.model, pole_bodies(cartpole, pole)),
@@ -235,5 +187,5 @@ def _joint(model: mujoco.MjModel, joint: int) -> str:
     return " of ".join(words)
 
 
-def _numbers(values: tuple[float, ...] | Vector) -> str:
+def _numbers(values: Vector) -> str:
     return " ".join(f"{value:.4g}" for value in values)

@@ -10,16 +10,13 @@ from typing import Final
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 
 from mjcartpole.physics.bodies import farthest_from_origin
-from mjcartpole.physics.cartpole import CartPole
+from mjcartpole.physics.cartpole import CartPole, Vector
 from mjcartpole.physics.equations import Parameters, coefficients
 from mjcartpole.physics.free_region import FreeRegion, wide_box
 from mjcartpole.physics.parameters import joint_label, label
 from mjcartpole.physics.structure import push
-
-Vector = npt.NDArray[np.float64]
 
 _SAMPLES: Final = 24
 _SPEED: Final = 5.0

@@ -29,6 +29,7 @@ leading shape. Scalars and arrays pass through the same lines.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final, NamedTuple, TypeAlias
 
@@ -103,16 +104,9 @@ class Parameters:
                 the pole or the timestep is nothing, the sign is neither 1 nor -1, or no push
                 along the rail could turn the pole.
         """
-        for name in ("cart_mass", "inertia", *_FRICTION_AND_ARMATURE):
-            _check(name, getattr(self, name), getattr(self, name) >= 0, "0 or more")
-        for name in ("pole_mass", "timestep"):
-            _check(name, getattr(self, name), getattr(self, name) > 0, "more than 0")
-        for name in ("com_distance", "gravity"):
-            _check(name, getattr(self, name), True, "finite")
-        for name in ("rail_tilt", "hinge_tilt", "skew", "lean"):
-            _check(
-                name, getattr(self, name), abs(getattr(self, name)) <= math.pi / 2, "at most pi/2"
-            )
+        for names, wanted, holds in _WANTED:
+            for name in names:
+                _check(name, getattr(self, name), holds(getattr(self, name)), wanted)
         within = abs(self._rise) < math.cos(self.skew)
         _check("rail tilt", self.rail_tilt, within, "an angle at which a push turns the pole")
         for force in self.forces:
@@ -132,13 +126,15 @@ class Parameters:
         return self.hinge_sign * level, self._rise
 
 
-_FRICTION_AND_ARMATURE: Final = (
-    "slider_damping",
-    "hinge_damping",
-    "motor_damping",
-    "slider_armature",
-    "hinge_armature",
+_RESISTING: Final = "slider_damping hinge_damping motor_damping slider_armature hinge_armature"
+
+_WANTED: Final[tuple[tuple[list[str], str, Callable[[float], bool]], ...]] = (
+    (["cart_mass", "inertia", *_RESISTING.split()], "0 or more", lambda value: value >= 0),
+    (["pole_mass", "timestep"], "more than 0", lambda value: value > 0),
+    (["com_distance", "gravity"], "finite", lambda value: True),
+    (["rail_tilt", "hinge_tilt", "skew", "lean"], "at most pi/2", lambda v: abs(v) <= math.pi / 2),
 )
+"""Which parameters must be what, in words and by a test."""
 
 
 def _check(name: str, value: float, holds: bool, wanted: str) -> None:
@@ -157,13 +153,8 @@ def uniform_rod(
 ) -> Parameters:
     """Return CartPole-v1's kind of cart-pole: a uniform rod without friction, by default its own.
 
-    Args:
-        cart_mass: M, kg.
-        pole_mass: m, kg.
-        length: The whole rod, m; gymnasium's `length` is half of it.
-        gravity: g, m/s^2.
-        force: N, to either side.
-        timestep: h, s.
+    SI units; `length` is the whole rod's, gymnasium's `length` is half of it; `force` acts to
+    either side.
 
     Raises:
         ConfigError: A number makes no sense.
@@ -248,16 +239,9 @@ def solve(
 ) -> tuple[Number, Number]:
     """Return both accelerations, by Cramer's rule (equations and source: see the module).
 
-    Args:
-        k: The coefficients.
-        x_dot: m/s, any shape that broadcasts with the others.
-        theta: rad.
-        theta_dot: rad/s.
-        force: What acts along the rail beside damping and gravity, N.
-        torque: What acts on the hinge beside damping and gravity, N m.
-
-    Returns:
-        `(x_acc, theta_acc)`: m/s^2, rad/s^2, of the broadcast shape.
+    The arguments are in m/s, rad, rad/s; force and torque are what acts on rail and hinge beside
+    damping and gravity, N and N m. All broadcast. The result is `(x_acc, theta_acc)` in m/s^2 and
+    rad/s^2.
     """
     sin, cos = np.sin(theta), np.cos(theta)
     coupled = k.coupling * cos - k.crossing * sin
@@ -300,10 +284,6 @@ def energy(p: Parameters, state: npt.ArrayLike) -> Array:
     """Return kinetic and potential energy together, J, shape (...,).
 
     Constant where nothing pushes or brakes. The cart has none of its own at x = 0.
-
-    Args:
-        p: The cart-pole.
-        state: Shape (..., 4).
     """
     k = coefficients(p)
     x, x_dot, theta, theta_dot = _split(state)
@@ -317,13 +297,7 @@ def energy(p: Parameters, state: npt.ArrayLike) -> Array:
 
 
 def derivative(p: Parameters, state: npt.ArrayLike, force: npt.ArrayLike) -> Array:
-    """Return time derivative of the state, shape (..., 4).
-
-    Args:
-        p: The cart-pole.
-        state: Shape (..., 4).
-        force: F, N; broadcasts against the state's leading shape.
-    """
+    """Return the time derivative of the state, shape (..., 4), under a force in N."""
     _, x_dot, theta, theta_dot = _split(state)
     x_acc, theta_acc = accelerations(p, x_dot, theta, theta_dot, np.asarray(force))
     return _join(x_dot, x_acc, theta_dot, theta_acc)
@@ -340,8 +314,8 @@ def step(
 
     Args:
         p: The cart-pole.
-        state: Shape (..., 4).
-        force: F, N, constant during the step; broadcasts against the state's leading shape.
+        state: Before the step.
+        force: F, N, constant during the step.
         integrator: `gym`: explicit Euler, positions move by the old velocities. `mujoco`: MuJoCo's
             `Euler`, which is semi-implicit: positions move by the new velocities, and damping
             brakes the new ones.
@@ -367,14 +341,7 @@ def step(
 def rk4_step(
     p: Parameters, state: npt.ArrayLike, force: npt.ArrayLike, h: float | None = None
 ) -> Array:
-    """Return the state one step of the classic Runge-Kutta method later, shape (..., 4).
-
-    Args:
-        p: The cart-pole.
-        state: Shape (..., 4).
-        force: F, N, constant during the step; broadcasts against the state's leading shape.
-        h: Seconds; the cart-pole's own timestep if None.
-    """
+    """Return the state one step of the classic Runge-Kutta method later; arguments as `step`'s."""
     h = p.timestep if h is None else h
     s = np.asarray(state)
     k1 = derivative(p, s, force)

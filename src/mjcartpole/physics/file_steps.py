@@ -36,7 +36,7 @@ def file_step(p: Parameters, state: npt.ArrayLike, force: npt.ArrayLike, method:
 
     Args:
         p: The cart-pole.
-        state: Shape (..., 4).
+        state: Before the step, shape (..., 4).
         force: F, N, constant during the step; broadcasts against the state's leading shape.
         method: One of `METHODS`.
     """

@@ -12,13 +12,11 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
-from mjcartpole.physics.cartpole import CartPole
+from mjcartpole.physics.cartpole import CartPole, Vector
 from mjcartpole.physics.equations import Parameters, derivative
 from mjcartpole.physics.parameters import is_on, joint_label, label
 from mjcartpole.physics.simulation import nothing_can_touch
 from mjcartpole.task import CARTPOLE_V1, Task
-
-Vector: TypeAlias = npt.NDArray[np.float64]
 
 Interval: TypeAlias = tuple[float, float]
 

@@ -37,15 +37,7 @@ def step_matrix(
 ) -> Array:
     """Return jacobian of one `equations.step`, shape (4, 4): what it makes of a small error.
 
-    Args:
-        p: The cart-pole.
-        integrator: Whose step.
-        h: Seconds; the cart-pole's own timestep if None.
-        state: Where, shape (4,); at rest at angle 0 if not given.
-        force: N.
-
-    Raises:
-        ConfigError: The integrator is unknown.
+    It is taken at a state, shape (4,), and under a force, N; the others are as `step` has them.
     """
     return _jacobian(lambda states: step(p, states, force, integrator, h), np.asarray(state))
 
@@ -56,9 +48,6 @@ def spectral_radius(p: Parameters, integrator: Integrator = "gym", h: float | No
     The largest absolute eigenvalue of `step_matrix`; see there for the arguments. The cart's
     position makes a double eigenvalue 1, so a pole that hangs, where nothing grows, gives 1 to
     about eight digits.
-
-    Raises:
-        ConfigError: The integrator is unknown.
     """
     return float(np.abs(np.linalg.eigvals(step_matrix(p, integrator, h))).max())
 

@@ -11,20 +11,17 @@ from typing import Final, NamedTuple
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 
 from mjcartpole import task
 from mjcartpole.errors import ModelError, NotACartPoleError
 from mjcartpole.physics.bodies import cart_bodies, data_at_zero, mass_of, pole_bodies
-from mjcartpole.physics.cartpole import CartPole
+from mjcartpole.physics.cartpole import CartPole, Vector
 from mjcartpole.physics.dry_friction import DryFriction
 from mjcartpole.physics.equations import Parameters
 from mjcartpole.physics.structure import directions, push
 
 TILT: Final = 1e-14
 """Sine of an angle that rounding alone can leave between two axes; anything more is a tilt."""
-
-Vector = npt.NDArray[np.float64]
 
 
 def read_parameters(cartpole: CartPole) -> Parameters:

@@ -1,7 +1,7 @@
 """State in, control in, state out: a cart-pole moved by MuJoCo, one control step at a time."""
 
 import copy
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import mujoco
 import numpy as np
@@ -10,7 +10,8 @@ import numpy.typing as npt
 from mjcartpole import task
 from mjcartpole.errors import ConfigError, SimulationError
 from mjcartpole.integrator import Integrator, check_integrator
-from mjcartpole.physics.cartpole import CartPole
+from mjcartpole.physics.cartpole import CartPole, Vector
+from mjcartpole.physics.library import one_line
 
 State = tuple[float, ...]
 """`(x, x_dot, theta, theta_dot)`: m, m/s, rad, rad/s; two more values for each further pole."""
@@ -69,7 +70,7 @@ class Simulation:
         return copy.deepcopy(self)
 
     @property
-    def state(self) -> npt.NDArray[np.float64]:
+    def state(self) -> Vector:
         """The state `(x, x_dot, theta, theta_dot, …)`, shape (size,), a copy."""
         return np.array(_state_of(self._qpos, self._qvel, self.cartpole.joints))
 
@@ -101,45 +102,37 @@ class Simulation:
         """Return the state as an observation, shape (size,)."""
         return self.state.astype(np.float32)
 
-    def steps(
-        self, states: npt.NDArray[np.float64], controls: npt.NDArray[np.float64]
-    ) -> npt.NDArray[np.float64]:
-        """Return one control step from each of many states.
+    def steps(self, states: Vector, controls: Vector) -> Vector:
+        """Return the states after one control step from each of many.
 
         Args:
             states: Shape (n, size).
             controls: Shape (n,).
-
-        Returns:
-            The states afterwards, shape (n, size).
         """
         after = np.empty_like(states)
-        for index, (state, control) in enumerate(zip(states, controls.tolist(), strict=True)):
-            self.state = state
+        for index, control in self._each(states, controls):
             after[index] = self.step(control)
         return after
 
-    def accelerations(
-        self, states: npt.NDArray[np.float64], controls: npt.NDArray[np.float64]
-    ) -> npt.NDArray[np.float64]:
-        """Return MuJoCo's accelerations in each of many states.
-
-        Args:
-            states: Shape (n, size).
-            controls: Shape (n,).
+    def accelerations(self, states: Vector, controls: Vector) -> Vector:
+        """Return MuJoCo's accelerations in each of many states; for the arguments see `steps`.
 
         Returns:
             `(x_acc, theta_acc, …)`, shape (n, size / 2): m/s^2, rad/s^2.
         """
-        model, data = self.model, self.data
         where = list(self.cartpole.joints)
         found = np.empty((len(states), len(where)))
+        for index, control in self._each(states, controls):
+            self.data.ctrl[0] = control
+            mujoco.mj_forward(self.model, self.data)
+            found[index] = self.data.qacc[where]
+        return found
+
+    def _each(self, states: Vector, controls: Vector) -> Iterator[tuple[int, float]]:
+        """Put the cart-pole into one state after the other; yield its number and its control."""
         for index, (state, control) in enumerate(zip(states, controls.tolist(), strict=True)):
             self.state = state
-            data.ctrl[0] = control
-            mujoco.mj_forward(model, data)
-            found[index] = data.qacc[where]
-        return found
+            yield index, control
 
 
 def stepping_model(model: mujoco.MjModel, integrator: Integrator) -> mujoco.MjModel:
@@ -182,7 +175,7 @@ def _nothing_else_constrains(model: mujoco.MjModel) -> bool:
     return not (model.neq or any(values.any() for values in constraints))
 
 
-def _floats(array: npt.NDArray[np.float64]) -> "memoryview[float]":
+def _floats(array: Vector) -> "memoryview[float]":
     """Return a view of MuJoCo's array that reads and writes single floats several times faster."""
     return array.data.cast("B").cast("d")
 
@@ -203,7 +196,7 @@ def _explicit_euler(
         try:
             mj_step(model, data)
         except mujoco.FatalError as error:
-            raise _gave_up(cartpole, error) from error
+            raise gave_up(cartpole, error) from error
         qpos[slider] = x
         qpos[hinge] = theta
         return x, qvel[slider], theta, qvel[hinge]
@@ -214,7 +207,7 @@ def _explicit_euler(
         try:
             mj_step(model, data)
         except mujoco.FatalError as error:
-            raise _gave_up(cartpole, error) from error
+            raise gave_up(cartpole, error) from error
         for joint, position in zip(joints, positions, strict=True):
             qpos[joint] = position
         return _state_of(qpos, qvel, joints)
@@ -243,7 +236,7 @@ def _own_integrator(
         try:
             mj_step(model, data, substeps)
         except mujoco.FatalError as error:
-            raise _gave_up(cartpole, error) from error
+            raise gave_up(cartpole, error) from error
         if is_one:
             return qpos[slider], qvel[slider], qpos[hinge], qvel[hinge]
         return _state_of(qpos, qvel, joints)
@@ -266,9 +259,9 @@ def as_one_pole(step: Callable[[float], State]) -> Callable[[float], State]:
     return advance
 
 
-def _gave_up(cartpole: CartPole, error: mujoco.FatalError) -> SimulationError:
-    reason = " ".join(str(error).split())
-    return SimulationError(f"MuJoCo gave up on {cartpole.name}: {reason}")
+def gave_up(cartpole: CartPole, error: Exception) -> SimulationError:
+    """Return the error that says on which model MuJoCo gave up, and why."""
+    return SimulationError(f"MuJoCo gave up on {cartpole.name}: {one_line(error)}")
 
 
 def silence_mujoco() -> None:

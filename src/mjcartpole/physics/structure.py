@@ -11,14 +11,11 @@ from typing import Final
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 
 from mjcartpole import task
 from mjcartpole.errors import NotACartPoleError
 from mjcartpole.physics.bodies import data_at_zero, mass_of, pole_bodies, subtree
-from mjcartpole.physics.cartpole import CartPole, motor_of
-
-Vector = npt.NDArray[np.float64]
+from mjcartpole.physics.cartpole import CartPole, Vector, motor_of
 
 MOST_SUBSTEPS: Final = 1_000
 """Physics steps per control step."""

@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 
 from mjcartpole.errors import ConfigError
-from mjcartpole.physics.edit.document import Document, Element
+from mjcartpole.physics.edit.document import Document
 from mjcartpole.physics.edit.element_path import find_element, known_attributes, label_of
 from mjcartpole.physics.edit.schema import attributes_of, did_you_mean
 from mjcartpole.physics.edit.schema import tags as schema_tags
@@ -93,15 +93,18 @@ def check_key(key: str) -> None:
         return
     tag = re.split(r"[.:]", key, maxsplit=1)[0]
     if tag not in schema_tags():
-        hint = (
-            did_you_mean(tag, schema_tags()) if ":" in key else did_you_mean(key, names_like(key))
-        )
-        raise ConfigError(f"nothing to edit is called {key!r}: {hint}")
+        near = (tag, schema_tags()) if ":" in key else (key, names_like(key))
+        raise ConfigError(f"nothing to edit is called {key!r}: {did_you_mean(*near)}")
     selector, _, attribute = key.rpartition(".")
     if not selector or not attribute:
         raise ConfigError(f"{key!r} names no attribute, as joint:hinge.damping does")
-    if "." not in selector and attribute not in attributes_of(tag):
-        hint = did_you_mean(attribute, attributes_of(tag))
+    if "." not in selector:
+        _check_attribute(key, tag, attribute, attributes_of(tag))
+
+
+def _check_attribute(key: str, tag: str, attribute: str, known: Sequence[str]) -> None:
+    if attribute not in known:
+        hint = did_you_mean(attribute, known)
         raise ConfigError(f"{key!r}: <{tag}> has no attribute {attribute!r}, {hint}")
 
 
@@ -161,7 +164,7 @@ def _apply_elements(document: Document, edits: Mapping[str, object]) -> None:
     written: dict[tuple[str, str], str] = {}
     for key, value in edits.items():
         element, attribute = find_element(document, key)
-        _check_attribute(key, element, attribute)
+        _check_attribute(key, element.tag, attribute, known_attributes(element))
         text = _text(key, value)
         _check_value(key, element.tag, attribute, text)
         place = label_of(element), attribute
@@ -169,13 +172,6 @@ def _apply_elements(document: Document, edits: Mapping[str, object]) -> None:
             raise ConfigError(f"{written[place]!r} and {key!r} are the same attribute; give one")
         written[place] = key
         document.set(element, attribute, text)
-
-
-def _check_attribute(key: str, element: Element, attribute: str) -> None:
-    known = known_attributes(element)
-    if attribute not in known:
-        hint = did_you_mean(attribute, known)
-        raise ConfigError(f"{key!r}: <{element.tag}> has no attribute {attribute!r}, {hint}")
 
 
 def _text(key: str, value: object) -> str:

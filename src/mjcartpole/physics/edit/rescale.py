@@ -12,16 +12,13 @@ from typing import Final
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 
 from mjcartpole.errors import ConfigError
 from mjcartpole.physics.bodies import cart_bodies, mass_of, pole_bodies
-from mjcartpole.physics.cartpole import CartPole
+from mjcartpole.physics.cartpole import CartPole, Vector
 from mjcartpole.physics.edit.document import Document, Element
 from mjcartpole.physics.edit.xml_elements import Parts, numbers_of
 from mjcartpole.physics.parameters import pole_of, rotation
-
-Vector = npt.NDArray[np.float64]
 
 _AS_WRITTEN: Final = 1e-5
 """An inertia this close, relative, to a uniform rod's is one, written with fewer digits."""

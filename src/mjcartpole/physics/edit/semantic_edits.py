@@ -8,14 +8,13 @@ from typing import Final
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 
 from mjcartpole import task
 from mjcartpole.errors import ConfigError
 from mjcartpole.physics.bodies import cart_bodies, mass_of
 from mjcartpole.physics.build import build
-from mjcartpole.physics.cartpole import CartPole
-from mjcartpole.physics.edit.document import Document
+from mjcartpole.physics.cartpole import CartPole, Vector
+from mjcartpole.physics.edit.document import Document, Element
 from mjcartpole.physics.edit.element_path import find_element
 from mjcartpole.physics.edit.rescale import set_cart_mass, set_length, set_pole_mass
 from mjcartpole.physics.edit.xml_elements import Parts, number_text
@@ -160,7 +159,7 @@ def _sort_by_pole(
 
 def _edit_pole(
     document: Document, before: CartPole, pole: int, values: Mapping[str, float]
-) -> npt.NDArray[np.float64]:
+) -> Vector:
     """Make the edits of one pole; returns where its centre of mass must then be, from the hinge."""
     wanted, longer = pole_of(before, pole), 1.0
     if values:
@@ -168,10 +167,8 @@ def _edit_pole(
     if "pole.length" in values:
         longer = set_length(Parts(document), before, values["pole.length"], pole)
     if "pole.length" in values or "pole.mass" in values:
-        mass = values.get("pole.mass", wanted.mass)
-        set_pole_mass(
-            Parts(document), build(document.text, before.name, own_timestep=True), mass, pole
-        )
+        stretched = build(document.text, before.name, own_timestep=True)
+        set_pole_mass(Parts(document), stretched, values.get("pole.mass", wanted.mass), pole)
     return longer * wanted.com
 
 
@@ -184,9 +181,14 @@ def _edit_options(document: Document, model: mujoco.MjModel, values: Mapping[str
         tokens[2] = number_text(0.0 - values["gravity"], tokens[2])
         document.set(option, name, " ".join(tokens))
     if "timestep" in values:
-        option, name = find_element(document, "option.timestep")
-        written = option.attributes.get(name, "")
-        document.set(option, name, number_text(values["timestep"], written))
+        _set_first(document, *find_element(document, "option.timestep"), values["timestep"])
+
+
+def _set_first(document: Document, element: Element, name: str, value: float) -> None:
+    """Write the first number of an attribute; what else it has stays."""
+    tokens = element.attributes.get(name, "").split() or [""]
+    tokens[0] = number_text(value, tokens[0])
+    document.set(element, name, " ".join(tokens))
 
 
 def _edit_joint(
@@ -197,10 +199,8 @@ def _edit_joint(
         if value is None:
             continue
         element = parts.joint(cartpole.model, joint)
-        tokens = element.attributes.get(name, "").split() or [""]
-        tokens[0] = number_text(value, tokens[0])
         if name in element.attributes or value != _joint_value(cartpole, joint, name):
-            parts.document.set(element, name, " ".join(tokens))
+            _set_first(parts.document, element, name, value)
 
 
 def _joint_value(cartpole: CartPole, joint: int, name: str) -> float:
@@ -222,13 +222,11 @@ def _edit_force(parts: Parts, cartpole: CartPole, force: float) -> None:
     before = float(model.actuator_gear[motor, 0])
     gear = math.copysign(force / abs(right / before), before)
     element = parts.actuator(motor)
-    tokens = element.attributes.get("gear", "").split() or [""]
-    tokens[0] = number_text(gear, tokens[0])
     if "gear" in element.attributes or gear != before:
-        parts.document.set(element, "gear", " ".join(tokens))
+        _set_first(parts.document, element, "gear", gear)
 
 
-def _check_centre(cartpole: CartPole, pole: int, wanted: npt.NDArray[np.float64]) -> None:
+def _check_centre(cartpole: CartPole, pole: int, wanted: Vector) -> None:
     """Refuse a pole of which not all has become longer in the same proportion."""
     found = pole_of(cartpole, pole).com
     if np.abs(found - wanted).max() > 1e-9 * np.abs(wanted).max():
