@@ -18,6 +18,7 @@ from hypothesis import strategies as st
 from numba.core.registry import cpu_target
 
 from mjcartpole import task
+from mjcartpole.learning import compiled as compiled_engine
 from mjcartpole.learning import discretizer, episodes, kernels, schedules, stepping
 from mjcartpole.learning.compiled import _arrays
 from mjcartpole.learning.config import TrainConfig
@@ -27,7 +28,7 @@ from mjcartpole.learning.methods import METHODS, action_values, experience
 from mjcartpole.learning.methods.experience import Trajectory, Transition
 from mjcartpole.learning.stepping import compiled
 from mjcartpole.physics import cartpole_v1
-from mjcartpole.task import one_per_step
+from mjcartpole.task import minus_one_at_the_end, one_per_step
 
 quick = settings(max_examples=200)
 
@@ -148,7 +149,58 @@ def test_the_checksum_covers_all_that_is_compiled_from_elsewhere():
     shared = (cartpole_v1, discretizer, episodes, schedules, stepping, action_values, experience)
     covered = {module.__name__ for module in (*shared, kernels, task)} | methods
     assert elsewhere <= covered
-    assert kernels._sources() != kernels._sources(task)
+    assert kernels._sources(one_per_step) != kernels._sources(minus_one_at_the_end)
+
+
+SCALE = 2.0
+NAMES = {"a": 1.0}
+
+
+def scaled(x, x_dot, theta, theta_dot, terminated):
+    return SCALE * math.cos(theta)
+
+
+def called(x, x_dot, theta, theta_dot, terminated):
+    return scaled(x, x_dot, theta, theta_dot, terminated)
+
+
+def looked_up(x, x_dot, theta, theta_dot, terminated):
+    return NAMES.get(str(theta), 0.5)
+
+
+def silent(x, x_dot, theta, theta_dot, terminated):
+    pass
+
+
+def typed_at_a_prompt():
+    names = {}
+    exec("def reward(x, x_dot, theta, theta_dot, terminated):\n    return -abs(theta)", names)
+    return names["reward"]
+
+
+def test_rewards_that_compile_and_whether_their_code_is_kept(monkeypatch):
+    for reward in (scaled, called, typed_at_a_prompt()):
+        assert kernels.why_not_compilable(reward) == ""
+    before = kernels._sources(scaled)
+    assert before
+    # What they call, and what has no source, may change unseen: it is compiled anew each time.
+    assert kernels._sources(called) == kernels._sources(typed_at_a_prompt()) == ""
+    monkeypatch.setitem(globals(), "SCALE", 3.0)
+    assert kernels._sources(scaled) != before
+
+
+@pytest.mark.parametrize(
+    ("reward", "why"),
+    [
+        (looked_up, "cannot be compiled: Failed in nopython mode"),
+        (silent, "does not always return a number"),
+        (functools.partial(scaled), "is no plain function"),
+    ],
+)
+def test_rewards_that_do_not_compile(reward, why):
+    assert kernels.why_not_compilable(reward).startswith(why)
+    rules = task.Task("odd", reward=reward)
+    assert f"the reward of odd {why}" in compiled_engine.unavailable("gym", task=rules)
 
 
 REWARDS = """

@@ -34,12 +34,16 @@ LEAST_MEMORY: Final = 2**20
 _log = logging.getLogger("mjcartpole")
 
 
-def unavailable(backend: Backend, cartpole: CartPole | None = None) -> str:
-    """Why the compiled engine cannot run here; empty if it can."""
+def unavailable(
+    backend: Backend, cartpole: CartPole | None = None, task: Task = CARTPOLE_V1
+) -> str:
+    """Return why the compiled engine cannot run here; nothing if it can."""
     if config.DISABLE_JIT:  # type: ignore[attr-defined]
         return "NUMBA_DISABLE_JIT is set"
     if cartpole is not None and cartpole.model.narena < LEAST_MEMORY:
         return f"{cartpole.name} gives MuJoCo so little memory that it may run out of it"
+    if why_not := kernels.why_not_compilable(task.reward):
+        return f"the reward of {task.name} {why_not}"
     return link(libmujoco()) if backend == "mujoco" else ""
 
 

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Literal, get_args
 
 from mjcartpole.envs.backend import Backend
 from mjcartpole.errors import check_known
+from mjcartpole.task import CARTPOLE_V1, Task
 
 if TYPE_CHECKING:
     from mjcartpole.physics.cartpole import CartPole
@@ -25,7 +26,12 @@ def check_engine(engine: str) -> None:
     check_known("engine", engine, get_args(Engine))
 
 
-def choose_engine(engine: str, backend: Backend, cartpole: "CartPole | None" = None) -> Engine:
+def choose_engine(
+    engine: str,
+    backend: Backend,
+    cartpole: "CartPole | None" = None,
+    task: Task = CARTPOLE_V1,
+) -> Engine:
     """Return the engine that was asked for, or the reference loop where that one cannot run.
 
     Logs one line, once, where the reference loop takes over.
@@ -34,6 +40,7 @@ def choose_engine(engine: str, backend: Backend, cartpole: "CartPole | None" = N
         engine: What was asked for.
         backend: Who does the physics.
         cartpole: The model, where it is known and the backend is mujoco.
+        task: The rules.
 
     Raises:
         ConfigError: There is no such engine.
@@ -41,7 +48,7 @@ def choose_engine(engine: str, backend: Backend, cartpole: "CartPole | None" = N
     check_engine(engine)
     if engine == "python":
         return "python"
-    why_not = _why_not_compiled(backend, cartpole)
+    why_not = _why_not_compiled(backend, cartpole, task)
     if not why_not:
         return "compiled"
     if why_not not in _said:
@@ -54,10 +61,10 @@ def choose_engine(engine: str, backend: Backend, cartpole: "CartPole | None" = N
     return "python"
 
 
-def _why_not_compiled(backend: Backend, cartpole: "CartPole | None") -> str:
+def _why_not_compiled(backend: Backend, cartpole: "CartPole | None", task: Task) -> str:
     try:
         # Numba is heavy, and refuses to be imported beside a NumPy that is newer than it knows.
         from mjcartpole.learning import compiled  # noqa: PLC0415
     except (ImportError, OSError) as error:
         return f"Numba does not work: {error}"
-    return compiled.unavailable(backend, cartpole)
+    return compiled.unavailable(backend, cartpole, task)

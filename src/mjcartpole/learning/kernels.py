@@ -9,7 +9,7 @@ alike: tables, returns and policies are equal bit for bit.
 import functools
 import hashlib
 import inspect
-import sys
+import math
 from collections.abc import Callable
 from types import FunctionType
 from typing import Any, Final, NamedTuple, TypeAlias, cast
@@ -17,6 +17,7 @@ from typing import Any, Final, NamedTuple, TypeAlias, cast
 import numba
 import numpy as np
 import numpy.typing as npt
+from numba import types
 from numba.extending import register_jitable
 
 from mjcartpole import task
@@ -135,12 +136,12 @@ def _log(columns: Columns, number: int, played: tuple[float, int, int]) -> None:
     columns.totals[number], columns.steps[number], columns.endings[number] = played
 
 
-def _entry(function: F) -> F:
+def _entry(function: F, sources: str) -> F:
     """Compile what Python calls, and keep it on disk, where a folder for that can be written."""
     jit = functools.partial(numba.njit, error_model="numpy", nogil=True)
     entry: Any
     try:
-        entry = jit(cache=True)(function)
+        entry = jit(cache=bool(sources))(function)
     except RuntimeError:
         entry = jit()(function)
     return cast(F, entry)
@@ -159,7 +160,7 @@ def learn_chunk(method: Any, reward: task.Reward) -> Callable[..., int]:
     begin_episode, act = _compilable(method.begin_episode), _compilable(method.act)
     after_step, after_episode = _compilable(method.after_step), _compilable(method.after_episode)
     _compilable(reward)
-    sources = _sources(method, sys.modules[reward.__module__])
+    sources = _sources(reward, method)
 
     def learn_chunk(
         physics: Physics,
@@ -207,14 +208,14 @@ def learn_chunk(method: Any, reward: task.Reward) -> Callable[..., int]:
                 return number + 1
         return numbers[1]
 
-    return _entry(learn_chunk)
+    return _entry(learn_chunk, sources)
 
 
 @functools.cache
 def play_chunk(reward: task.Reward) -> Callable[..., int]:
     """Return the compiled loop that plays, where this is the reward of a step."""
     _compilable(reward)
-    sources = _sources(sys.modules[reward.__module__])
+    sources = _sources(reward)
 
     def play_chunk(
         physics: Physics,
@@ -240,7 +241,7 @@ def play_chunk(reward: task.Reward) -> Callable[..., int]:
                 return number + 1
         return numbers[1]
 
-    return _entry(play_chunk)
+    return _entry(play_chunk, sources)
 
 
 _known: Final[set[FunctionType]] = set()
@@ -251,17 +252,59 @@ def _compilable(function: Any) -> Any:
     if isinstance(function, FunctionType) and function not in _known:
         _known.add(function)
         register_jitable(function)
-        for name in function.__code__.co_names:
-            _compilable(function.__globals__.get(name))
+        for value in _globals_of(function):
+            _compilable(value)
     return function
 
 
-def _sources(*modules: Any) -> str:
-    """Return a checksum of all that is compiled into an entry.
+def _globals_of(function: FunctionType) -> list[Any]:
+    names = function.__code__.co_names
+    return [function.__globals__[name] for name in names if name in function.__globals__]
+
+
+@functools.cache
+def why_not_compilable(reward: task.Reward) -> str:
+    """Return why compiled code cannot call a reward; nothing if it can."""
+    if reward in task.CONSTANT:
+        return ""
+    if not isinstance(reward, FunctionType):
+        return "is no plain function"
+    trial: Any = compiled(_compilable(reward))
+    try:
+        trial.compile((numba.float64,) * 4 + (numba.boolean,))
+    except Exception as error:  # Numba has more kinds than it documents.
+        lines = [line for line in str(error).splitlines() if line.strip()]
+        return f"cannot be compiled: {' '.join(lines[:2])}"
+    if not isinstance(trial.nopython_signatures[0].return_type, types.Number | types.Boolean):
+        return "does not always return a number"
+    return ""
+
+
+def _sources(reward: Any, *methods: Any) -> str:
+    """Return a checksum of all that is compiled into an entry; nothing where that is not known.
 
     Numba keeps what it compiled until the file of the entry changes, and would not see that another
     file did. A value that an entry closes over is part of the cache's key.
     """
-    shared = (cartpole_v1, discretizer, episodes, schedules, stepping, action_values, experience)
-    texts = [inspect.getsource(module) for module in (*shared, *modules)]
-    return hashlib.sha256("".join([*texts, repr(LARGEST_SANE)]).encode()).hexdigest()
+    constants = _globals_of(reward)
+    # Functions and objects that a reward takes from elsewhere change without its own text.
+    if reward.__closure__ or not all(type(each) in _PLAIN for each in constants):
+        return ""
+    try:
+        texts = [inspect.getsource(each) for each in (*_SHARED, *methods, reward)]
+    except (OSError, TypeError):
+        return ""  # It was typed at a prompt.
+    return hashlib.sha256("".join([*texts, repr((LARGEST_SANE, constants))]).encode()).hexdigest()
+
+
+_SHARED: Final = (
+    cartpole_v1,
+    discretizer,
+    episodes,
+    schedules,
+    stepping,
+    task,
+    action_values,
+    experience,
+)
+_PLAIN: Final = {bool, int, float, type(math)}

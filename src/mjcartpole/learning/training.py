@@ -125,7 +125,7 @@ class Training:
             self._env = env
             return
         physics = (config.backend, cartpole or config.model, config.integrator, config.rules)
-        self.engine = choose_engine(engine, config.backend, cartpole)
+        self.engine = choose_engine(engine, config.backend, cartpole, config.rules)
         if self.engine == "compiled":
             from mjcartpole.learning.compiled import CompiledLoop  # noqa: PLC0415 - it is heavy
 

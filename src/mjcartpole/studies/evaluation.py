@@ -118,9 +118,9 @@ def evaluate(
         from mjcartpole.physics.load import load_model  # noqa: PLC0415 - it imports MuJoCo
 
         model = load_model(model)
-        engine, poles, name = choose_engine(engine, backend, model), model.poles, model.name
+        engine, poles, name = choose_engine(engine, backend, model, rules), model.poles, model.name
     else:
-        engine, poles, name = choose_engine(engine, backend), 1, GYM_ID
+        engine, poles, name = choose_engine(engine, backend, task=rules), 1, GYM_ID
     if isinstance(policy, Policy):
         policy.check_fits(poles, name)
     if engine == "compiled" and isinstance(policy, Policy):
