@@ -43,6 +43,7 @@ FAST = {
         "import gymnasium",
     },
     "docs/performance.md": {"mjcartpole --help"},
+    "docs/tasks.md": {"import math"},
     "docs/variants.md": {
         "mjcartpole evaluate runs/tuned-mujoco-seed0 --set hinge.damping=0.2",
         "mjcartpole model edit cartpole --set pole.length=1.5 -o mine.xml",
