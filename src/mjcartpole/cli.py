@@ -15,8 +15,8 @@ import tyro
 
 from mjcartpole import __version__
 from mjcartpole.commands.options import FAILED, Command, UsageError
-from mjcartpole.commands.registry import COMMANDS, default_of, grammar, name_of
-from mjcartpole.commands.words import list_flags, rewritten
+from mjcartpole.commands.registry import COMMANDS, grammar, name_of
+from mjcartpole.commands.words import LISTS, rewritten
 from mjcartpole.errors import MjCartPoleError
 from mjcartpole.output import has_left, patient_output, stdout_problem
 from mjcartpole.signals import Interrupted, StopSignals
@@ -99,11 +99,10 @@ def parse(argv: Sequence[str]) -> Command:
         UsageError: A word of it is not understood.
         SystemExit: With code 0, after `--help`.
     """
-    lists = {flag for each in COMMANDS for flag in list_flags(default_of(each, argv) or each)}
-    words = rewritten(argv, lists)
+    words = rewritten(argv)
     complaint = io.StringIO()
     try:
-        with contextlib.redirect_stderr(complaint):
+        with contextlib.redirect_stderr(complaint), LISTS:
             command: Command = tyro.cli(
                 grammar(words),
                 args=words,

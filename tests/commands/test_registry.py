@@ -7,7 +7,6 @@ import textwrap
 import pytest
 
 from mjcartpole import cli
-from mjcartpole.commands import registry
 from mjcartpole.commands.options import Command
 from mjcartpole.commands.registry import COMMANDS, name_of
 
@@ -80,7 +79,7 @@ def test_a_new_command_runs(count, capsys):
     ("words", "said"),
     [
         (["--bins", "0,1"], "bins must be from 1 up"),
-        (["--bins", "x"], "see mjcartpole count --help"),
+        (["--bins", "x"], "--bins: 'x' is no whole number; see mjcartpole count --help"),
         (["--bin", "1"], "perhaps you meant --bins"),
     ],
 )
@@ -97,10 +96,8 @@ def test_commands_are_called_by_their_files_names():
         assert command.__doc__
 
 
-def test_defaults_are_asked_of_the_command_that_is_named():
-    (train,) = [command for command in COMMANDS if name_of(command) == "train"]
-    words = ["train", "--preset=article", "--method", "sarsa"]
-    default = registry.default_of(train, words)
-    assert (default.where.preset, default.config.method) == ("article", "sarsa")
-    assert not hasattr(default.config, "td_lambda")
-    assert registry.default_of(train, ["watch", *words[1:]]) is None
+def test_a_preset_is_read_for_the_command_that_is_named(capsys):
+    code, _, err = call(["watch", "--preset", "article", "--help"], capsys)
+    assert (code, err) == (0, "")
+    code, _, err = call(["evaluate", "run", "--preset", "nothing"], capsys)
+    assert (code, "--preset" in err, "available" in err) == (2, True, False)

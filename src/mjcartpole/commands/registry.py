@@ -34,25 +34,15 @@ def name_of(command: type[Command]) -> str:
     return command.__name__.lower()
 
 
-def default_of(command: type[Command], words: Sequence[str]) -> Command | None:
-    """Return what is meant by flags that are left out, where the words name the command.
-
-    Raises:
-        ConfigError: A word that decides it makes no sense.
-    """
-    return command.default(words) if words[:1] == [name_of(command)] else None
-
-
 def grammar(words: Sequence[str]) -> Any:  # noqa: ANN401 - a union that is made here
-    """Return the type that tyro reads a command line as.
+    """Return the type that tyro reads a command line as; its words may decide some defaults.
 
     Raises:
-        ConfigError: See `default_of`.
+        ConfigError: A word that does makes no sense.
     """
-    parts = [_subcommand(command, default_of(command, words)) for command in COMMANDS]
-    return functools.reduce(operator.or_, parts)
-
-
-def _subcommand(command: type[Command], default: Command | None) -> Any:  # noqa: ANN401
-    given: dict[str, Any] = {} if default is None else {"default": default}
-    return Annotated[command, tyro.conf.subcommand(name_of(command), **given)]
+    subcommands = []
+    for command in COMMANDS:
+        default = command.default(words) if words[:1] == [name_of(command)] else None
+        given: dict[str, Any] = {} if default is None else {"default": default}
+        subcommands.append(Annotated[command, tyro.conf.subcommand(name_of(command), **given)])
+    return functools.reduce(operator.or_, subcommands)

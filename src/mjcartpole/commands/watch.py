@@ -37,7 +37,7 @@ class Watch(Command):
 
     def run(self) -> int:
         """Show what the model comes to, now and after every save."""
-        from mjcartpole.commands.watch_work import Recipe, work_on_saves
+        from mjcartpole.commands.watch_work import WatchWork
         from mjcartpole.commands.watched_file import Watched
         from mjcartpole.physics.load import find_model
         from mjcartpole.physics.simulation import silence_mujoco
@@ -48,11 +48,11 @@ class Watch(Command):
             raise ConfigError(f"once must be a whole number from 1 up, not {self.once}")
         file = find_model(self.file)
         signals = StopSignals()
-        recipe = Recipe(signals, self._config(file), self.video)
+        work = WatchWork(Watched(file), self._config(file), self.video, signals)
         check_writable(make_folder(VIDEOS))
         with signals.caught():
             try:
-                work_on_saves(Watched(file), recipe, self.once)
+                work.go_on(self.once)
             except Interrupted:
                 raise Interrupted(f"no longer watching {file}", signals.number) from None
         return 0

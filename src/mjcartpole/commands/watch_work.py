@@ -27,6 +27,12 @@ from mjcartpole.task import CARTPOLE_V1
 
 RUNGS: Final = (2, 3, 4)
 """Of the ladder: those that take no time."""
+VERDICTS: Final = {
+    "holds": "as the equations say",
+    "fails": "FAILS",
+    "beyond": "beyond the equations",
+    "skipped": "skipped",
+}
 LEAN: Final = 0.1
 """How far the pole leans in the sketch, rad."""
 EVALUATED: Final = 50
@@ -44,145 +50,143 @@ _LEAST_EVALUATED: Final = 3
 
 
 @dataclass(frozen=True)
-class Recipe:
-    """What follows from a save.
+class WatchWork:
+    """All that follows from each save of a file.
 
     Attributes:
+        watched: The file.
+        config: How to train on it.
+        video: Whether it is filmed.
         signals: Where a signal that shall end it is noted.
-        config: How to train; the model is the file's.
-        video: Whether there is a video.
     """
 
-    signals: StopSignals
+    watched: Watched
     config: TrainConfig
     video: bool
+    signals: StopSignals
 
+    def go_on(self, once: int | None) -> None:
+        """Work on the file now and after every save: so many times, or while somebody looks."""
+        print(f"watching {self.watched.path}; Ctrl-C ends it", flush=True)
+        done = 0
+        while once is None or done < once:
+            if done and not self._await_save():
+                return
+            self.watched.take()
+            while not self._is_done():
+                self.watched.take()
+            done += 1
 
-def work_on_saves(watched: Watched, recipe: Recipe, once: int | None) -> None:
-    """Work on the file as it is, and after every save.
+    def _await_save(self) -> bool:
+        """Wait for a save; return false if nobody looks any more."""
+        while not self.watched.has_changed():
+            if stdout_problem() is not None:
+                return False
+            time.sleep(POLL)
+        return True
 
-    Args:
-        watched: The file.
-        recipe: What is done.
-        once: How often; None: until Ctrl-C, or until nobody looks any more.
-    """
-    print(f"watching {watched.path}; Ctrl-C ends it", flush=True)
-    done = 0
-    watched.take()
-    while True:
+    def _is_done(self) -> bool:
+        """Work on the file as it is; return false if it was not whole, or is another by now."""
         try:
-            _follow(watched, recipe)
+            self._work()
         except SavedAgainError:
             _say("saved", "again before this was done: starting over")
-            watched.take()
-            continue
+            return False
         except MjCartPoleError as error:
-            if watched.goes_on():
-                watched.take()
-                continue
+            if self.watched.goes_on():
+                return False
             _say("error", f"{error}")
             _say("waiting", "for the next save")
-        done += 1
-        if once is not None and done >= once:
+        return True
+
+    def _work(self) -> None:
+        started, name = time.perf_counter(), self.watched.path.stem
+        print(f"\n{time.strftime('%H:%M:%S')}  {self.watched.path}", flush=True)
+        cartpole = self.config.load_model()
+        sketch = VIDEOS / f"{name}-sketch.png"
+        _draw_sketch(cartpole, sketch)
+        _say("sketch", f"{sketch}, {time.perf_counter() - started:.1f} s")
+        self.watched.check()
+        self._hold_against_itself(cartpole)
+        result = self._train(cartpole)
+        integrator = result.config.integrator
+        episodes = _count_evaluated(result)
+        evaluation = evaluate(
+            result.policy, model=cartpole, integrator=integrator, episodes=episodes
+        )
+        _say("greedy", _greedy(evaluation))
+        self.watched.check()
+        if self.video:
+            setup = PolicySetup(name, result.policy, "mujoco", cartpole, integrator)
+            self._film(setup, VIDEOS / f"{name}.mp4")
+        _say("done", f"in {time.perf_counter() - started:.1f} s")
+
+    def _hold_against_itself(self, cartpole: CartPole) -> None:
+        results = []
+        try:
+            for result in run_ladder(Subject(cartpole, "itself", quick=True), RUNGS):
+                results.append(result)
+                self.watched.check()
+        except MjCartPoleError as error:
+            # A cart-pole whose parameters cannot be read may balance all the same.
+            _say("parity", f"the equations do not apply: {error}")
             return
-        while not watched.has_changed():
-            if stdout_problem() is not None:
-                return  # Nobody looks any more.
-            time.sleep(POLL)
-        watched.take()
+        _say("parity", _verdicts(results))
+
+    def _train(self, cartpole: CartPole) -> TrainResult:
+        """Train; with fewer episodes where this model would take too long."""
+        asked = episodes = self.config.episodes
+        training = Training(self.config, cartpole=cartpole)
+        for _ in training.run():
+            self.watched.check()
+            episodes = affordable(training.result())
+            if episodes < asked:
+                break
+        if episodes < asked:
+            _say("training", f"{episodes:,} episodes instead of {asked:,}: it is slow")
+            shorter = dataclasses.replace(self.config, episodes=episodes)
+            training = Training(shorter, cartpole=cartpole)
+            for _ in training.run():
+                self.watched.check()
+        result = training.result()
+        recent = result.returns[-100:]
+        _say(
+            "training",
+            f"{len(result.returns):,} episodes in {result.seconds:.1f} s, "
+            f"mean return of the last {len(recent)}: {recent.mean():.1f}",
+        )
+        return result
+
+    def _film(self, setup: PolicySetup, path: Path) -> None:
+        casts = [play(setup)]
+        self.watched.check()
+        # Shadows and smooth edges would cost more time than all the rest, a sky nearly as much.
+        look = VideoOptions(quality="draft", fps=FPS)
+        video, drawn_by = write_film(casts, look, path, self.signals, self.watched.check)
+        raise_noted(self.signals)
+        _say("video", f"{video.path} ({what_happened(casts)}; drawn by {drawn_by})")
 
 
-def _follow(watched: Watched, recipe: Recipe) -> None:
-    """Do all that follows from a save.
-
-    Raises:
-        SavedAgainError: The file was saved meanwhile.
-        MjCartPoleError: Something cannot be done with this model.
-    """
-    started = time.perf_counter()
-    print(f"\n{time.strftime('%H:%M:%S')}  {watched.path}", flush=True)
-    cartpole, name = recipe.config.load_model(), watched.path.stem
-    _sketch(cartpole, VIDEOS / f"{name}-sketch.png", started)
-    watched.check()
-    _hold_against_itself(cartpole, watched)
-    result = _train(recipe.config, cartpole, watched)
-    evaluation = evaluate(
-        result.policy,
-        model=cartpole,
-        integrator=result.config.integrator,
-        episodes=_count_evaluated(result),
-    )
-    _say("greedy", _greedy(evaluation))
-    watched.check()
-    if recipe.video:
-        setup = PolicySetup(name, result.policy, "mujoco", cartpole, result.config.integrator)
-        _film(setup, VIDEOS / f"{name}.mp4", watched, recipe.signals)
-    _say("done", f"in {time.perf_counter() - started:.1f} s")
-
-
-def _sketch(cartpole: CartPole, path: Path, started: float) -> None:
-    """A picture that needs no OpenGL, and no waiting."""
+def _draw_sketch(cartpole: CartPole, path: Path) -> None:
+    """Draw a picture that needs no OpenGL, and no waiting."""
     with open_renderer(cartpole, kind="sketch") as renderer:
         picture = Image.fromarray(renderer.render((0.0, 0.0, *(LEAN, 0.0) * cartpole.poles)))
     with atomic_write(path) as temporary:
         picture.save(temporary)
-    _say("sketch", f"{path}, {time.perf_counter() - started:.1f} s")
-
-
-def _hold_against_itself(cartpole: CartPole, watched: Watched) -> None:
-    try:
-        subject = Subject(cartpole, "itself", quick=True)
-        results = []
-        for result in run_ladder(subject, RUNGS):
-            results.append(result)
-            watched.check()
-    except MjCartPoleError as error:
-        # A cart-pole whose parameters cannot be read may balance all the same.
-        _say("parity", f"the equations do not apply: {error}")
-        return
-    _say("parity", _verdicts(results))
 
 
 def _verdicts(results: list[Result]) -> str:
-    """One line: what holds, and why the rest does not."""
+    """Return one line: what holds, and why the rest does not."""
     phrases = []
-    for verdict, words in (
-        ("holds", "as the equations say"),
-        ("fails", "FAILS"),
-        ("beyond", "beyond the equations"),
-        ("skipped", "skipped"),
-    ):
+    for verdict, words in VERDICTS.items():
         rungs = [str(result.rung) for result in results if result.verdict == verdict]
         if rungs:
             phrases.append(f"{words} (rung {', '.join(rungs)})")
-    reasons = {result.skipped for result in results if result.skipped}
-    return "; ".join([*phrases, *sorted(reasons)])
-
-
-def _train(config: TrainConfig, cartpole: CartPole, watched: Watched) -> TrainResult:
-    """Train; with fewer episodes where this model would take too long."""
-    training = Training(config, cartpole=cartpole)
-    for _ in training.run():
-        watched.check()
-        episodes = affordable(training.result())
-        if episodes < config.episodes:
-            _say("training", f"{episodes:,} episodes instead of {config.episodes:,}: it is slow")
-            training = Training(dataclasses.replace(config, episodes=episodes), cartpole=cartpole)
-            for _ in training.run():
-                watched.check()
-            break
-    result = training.result()
-    recent = result.returns[-100:]
-    _say(
-        "training",
-        f"{len(result.returns):,} episodes in {result.seconds:.1f} s, "
-        f"mean return of the last {len(recent)}: {recent.mean():.1f}",
-    )
-    return result
+    return "; ".join([*phrases, *sorted({result.skipped for result in results} - {""})])
 
 
 def affordable(now: TrainResult) -> int:
-    """How many episodes there is time for, should all of them last to the time limit."""
+    """Return how many episodes there is time for, should all of them last to the time limit."""
     asked = now.config.episodes
     if now.seconds < _TRIAL:
         return asked
@@ -194,7 +198,7 @@ def affordable(now: TrainResult) -> int:
 
 
 def _count_evaluated(result: TrainResult) -> int:
-    """How many greedy episodes there is time for, should all of them last to the time limit."""
+    """Return how many greedy episodes there is time for, should all last to the time limit."""
     seconds_per_episode = result.seconds / max(result.steps, 1) * CARTPOLE_V1.time_limit
     return max(_LEAST_EVALUATED, min(EVALUATED, int(EVALUATION_PATIENCE / seconds_per_episode)))
 
@@ -206,16 +210,6 @@ def _greedy(evaluation: Evaluation) -> str:
         f"mean return {returns.mean():.1f}, minimum {returns.min():.0f} "
         f"of {len(returns)} episodes ({endings})"
     )
-
-
-def _film(setup: PolicySetup, path: Path, watched: Watched, signals: StopSignals) -> None:
-    casts = [play(setup)]
-    watched.check()
-    # Shadows and smooth edges would cost more time than all the rest, a sky nearly as much.
-    look = VideoOptions(quality="draft", fps=FPS)
-    video, drawn_by = write_film(casts, look, path, signals, watched.check)
-    raise_noted(signals)
-    _say("video", f"{video.path} ({what_happened(casts)}; drawn by {drawn_by})")
 
 
 def _say(what: str, text: str) -> None:

@@ -1,33 +1,37 @@
-"""The words of a command line, as people write them, made into those that tyro takes."""
+"""The words of a command line as people write them: edits in several places, commas in lists."""
 
-import dataclasses
 import os
 import re
-from collections.abc import Iterator, Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING, get_args, get_origin, get_type_hints
+from collections.abc import Sequence
+from typing import Any, Final, get_args
+
+from tyro.constructors import ConstructorRegistry, PrimitiveConstructorSpec, PrimitiveTypeInfo
 
 from mjcartpole.commands.options import UsageError
 
-if TYPE_CHECKING:
-    from _typeshed import DataclassInstance
+LISTS = ConstructorRegistry()
+"""How tyro reads a flag that takes several numbers or names: with commas between them too."""
 
 _DASHED_FILE = re.compile(r"-(?!-|o=).+\.(mp4|gif|webp|png|xml|json)")
 """A file whose name begins with a dash: no flag with a single one looks like this."""
 
 
-def rewritten(words: Sequence[str], lists: set[str]) -> list[str]:
-    """Return the words with all edits after one `--set`, and without commas in lists.
-
-    Args:
-        words: What was typed.
-        lists: The flags whose values may have commas between them.
-
-    Raises:
-        UsageError: A list has a gap.
-    """
+def rewritten(words: Sequence[str]) -> list[str]:
+    """Return the words with all edits after one `--set`, wherever and however often they stood."""
     words = [f"./{word}" if _DASHED_FILE.fullmatch(word) else word for word in words]
-    return _split_lists(_gather_edits(words), lists)
+    others, edits, follows, first = [], list[str](), False, False
+    for word in words:
+        if word == "--set" or word.startswith("--set="):
+            edits += [word.removeprefix("--set=")] if "=" in word else []
+            follows, first = True, "=" not in word
+        elif follows and (first or "=" in word) and not word.startswith("-"):
+            # The first one is meant as an edit, even where it is none.
+            edits.append(word)
+            first = False
+        else:
+            follows = False
+            others.append(word)
+    return [*others, "--set", *edits] if edits else others
 
 
 def value_of(flag: str, words: Sequence[str], otherwise: str) -> str:
@@ -40,59 +44,36 @@ def value_of(flag: str, words: Sequence[str], otherwise: str) -> str:
     return otherwise
 
 
-def list_flags(grammar: "DataclassInstance | type[DataclassInstance]") -> Iterator[str]:
-    """Yield the flags of a command that take several numbers or names; a path may have commas.
-
-    Args:
-        grammar: A dataclass of flags, or one's instance.
-    """
-    hints = get_type_hints(grammar if isinstance(grammar, type) else type(grammar))
-    for field in dataclasses.fields(grammar):
-        hint = hints[field.name]
-        part = getattr(grammar, field.name, hint)
-        if dataclasses.is_dataclass(part):
-            yield from list_flags(part)
-        elif get_origin(hint) is tuple and get_args(hint)[0] is not Path and field.name != "set":
-            yield f"--{field.name.replace('_', '-')}"
+_KINDS: Final = {int: "whole number", float: "number", str: "name"}
 
 
-def _gather_edits(words: Sequence[str]) -> list[str]:
-    """Return one --set with all edits, wherever and however often they were given."""
-    others, edits, follows, first = [], list[str](), False, False
-    for word in words:
-        if word == "--set" or word.startswith("--set="):
-            edits += _split_edits(word.removeprefix("--set=")) if "=" in word else []
-            follows, first = True, "=" not in word
-        elif follows and (first or "=" in word) and not word.startswith("-"):
-            # The first one is meant as an edit, even where it is none.
-            edits += _split_edits(word)
-            first = False
-        else:
-            follows = False
-            others.append(word)
-    return [*others, "--set", *edits] if edits else others
+@LISTS.primitive_rule
+def _list_rule(info: PrimitiveTypeInfo) -> PrimitiveConstructorSpec[Any] | None:
+    kind, *more = get_args(info.type) or (None,)
+    if info.type_origin is not tuple or kind not in _KINDS or more != [...]:
+        return None  # A path may have commas.
+    return PrimitiveConstructorSpec(
+        nargs="*",
+        metavar="[{0} [{0} ...]]".format(kind.__name__.upper()),
+        instance_from_str=lambda words: tuple(
+            _read(kind, v) for word in words for v in _values(word)
+        ),
+        is_instance=lambda value: isinstance(value, tuple),
+        str_from_instance=lambda values: list(map(str, values)),
+    )
 
 
-def _split_edits(word: str) -> list[str]:
-    """Return the edits of a word, which may have commas between them: a.b=1,c.d=2."""
-    return re.split(r",(?=[\w.:]+=)", word)
+def _read(kind: Any, text: str) -> Any:  # noqa: ANN401 - one of three
+    try:
+        return kind(text)
+    except ValueError:
+        raise ValueError(f"'{text}' is no {_KINDS[kind]}") from None
 
 
-def _split_lists(words: Sequence[str], lists: set[str]) -> list[str]:
-    """Return the values of a flag that has several without commas: 1,3,6,8 as 1 3 6 8."""
-    found, follows = list[str](), False
-    for word in words:
-        flag, _, value = word.partition("=")
-        if flag in lists:
-            follows = True
-            found += [flag, *_split_values(value)]
-        else:
-            follows = follows and not re.match(r"--|-[A-Za-z]$", word)
-            found += _split_values(word) if follows else [word]
-    return found
-
-
-def _split_values(word: str) -> list[str]:
+def _values(word: str) -> list[str]:
+    """Return the values in a word: 1,3 has two, a.b=1,c.d=2 too, and a.b=1,2 is one."""
+    if "=" in word:
+        return re.split(r",(?=[\w.:]+=)", word)
     if os.path.exists(word):  # noqa: PTH110 - a Path raises where a name is too long
         return [word]
     if word.startswith("[") and word.endswith("]"):

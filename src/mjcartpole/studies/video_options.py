@@ -45,7 +45,7 @@ class VideoOptions:
         width, _, height = self.size.lower().partition("x")
         if not (width.isdecimal() and height.isdecimal()):
             raise RenderError(
-                f"size is a width and a height in pixels, such as 640x480, not '{self.size}'"
+                f"--size is a width and a height in pixels, such as 640x480, not '{self.size}'"
             )
 
     @property
