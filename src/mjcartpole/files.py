@@ -140,6 +140,11 @@ def remove(path: Path) -> None:
         raise FileError(f"cannot remove '{path}': {brief(error)}") from error
 
 
+def is_there(path: Path) -> bool:
+    """Return whether a path leads to something; one that is no path leads to nothing."""
+    return _mode(path, follow=True) != 0
+
+
 def is_file(path: Path) -> bool:
     """Whether a regular file, or a link to one, can be seen there."""
     return stat.S_ISREG(_mode(path, follow=True))

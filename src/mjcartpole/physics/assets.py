@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Final
 
 from mjcartpole.errors import ModelError, ModelNotFoundError
-from mjcartpole.files import is_file, is_folder
+from mjcartpole.files import is_file, is_folder, is_there
 from mjcartpole.physics.edit.document import Document, Element
 
 MODEL: Final = "model"
@@ -30,11 +30,11 @@ _STORED: Final = re.compile(r"asset-[0-9a-f]{32}(\.\w{1,10})?")
 
 @dataclass(frozen=True)
 class Asset:
-    """A file that an element names.
+    """A file that an attribute of an element names.
 
     Attributes:
         element: The element.
-        attribute: The attribute that names the file.
+        attribute: The attribute.
         path: Where MuJoCo finds it, absolute.
         tried: All paths that MuJoCo may open for it.
     """
@@ -67,11 +67,7 @@ class Folders:
     def check(self, path: Path, called: str) -> None:
         """Refuse what lies outside, and what is no regular file: MuJoCo might read it for ever.
 
-        A file that is missing is MuJoCo's to refuse.
-
-        Args:
-            path: Where it is.
-            called: What names it, in words.
+        A file that is missing is MuJoCo's to refuse. `called` is what names it, in words.
 
         Raises:
             ModelNotFoundError: It is a folder, a pipe or a device, or may not be read.
@@ -83,28 +79,47 @@ class Folders:
                     f"{called} is not read: '{path}' lies outside the run's folder; if you trust "
                     f"this run, allow it with --allow-assets {real.parent} (allow_assets=…)"
                 )
-        if kind := what_else(path):
-            raise ModelNotFoundError(f"{called} cannot be read: '{path}' is {kind}")
+        check_kind(path, called)
+
+
+def check_kind(path: Path, called: str) -> None:
+    """Refuse what is there in place of a regular file."""
+    if is_there(path) and not is_file(path):
+        kind = "a folder" if is_folder(path) else "no regular file"
+        raise ModelNotFoundError(f"{called} cannot be read: '{path}' is {kind}")
 
 
 def find_assets(
     document: Document, folders: Folders, origins: Sequence[Path | None]
 ) -> list[Asset]:
-    """Return all files that a document names, but for its includes.
+    """Return all files that a document, includes put in their place, names.
 
-    Args:
-        document: The document, includes put in their place.
-        folders: Where MuJoCo looks for them.
-        origins: For each element the absolute folder of the file that it was included from, None
-            where it is the main file's own.
+    `origins` has for each element the absolute folder of the file that it was included from, None
+    where it is the main file's own.
     """
     compilers = [each.attributes for each in _compilers(document)]
-    return [
-        _asset(element, attribute, folders, compilers, origin)
-        for element, origin in zip(document.root.walk(), origins, strict=True)
-        for attribute, name in element.attributes.items()
-        if attribute.startswith("file") and name and element.tag != "include"
-    ]
+    assets = []
+    for element, origin in zip(document.root.walk(), origins, strict=True):
+        for attribute, name in element.attributes.items():
+            if attribute.startswith("file") and name and element.tag != "include":
+                paths = _paths(element.tag, name, folders, compilers, origin)
+                assets.append(Asset(element, attribute, *paths))
+    return assets
+
+
+def _paths(
+    tag: str, name: str, folders: Folders, compilers: list[dict[str, str]], origin: Path | None
+) -> tuple[Path, tuple[Path, ...]]:
+    """Return where MuJoCo finds a file that an element of a tag names, and all that it tries."""
+    given = ""
+    if tag != MODEL:
+        name = re.split(r"[/\\]", name)[-1] if folders.strip else name
+        given = _given(compilers, "texturedir" if tag == "texture" else "meshdir")
+    usual = _join(folders.main / _plain(given), name)
+    if origin is None:
+        return usual, (usual,)
+    first, beside = _join(_sought(tag, folders.main, compilers), name), _join(origin, name)
+    return usual if is_there(first) else beside, (usual, first, beside)
 
 
 def strips(document: Document) -> bool:
@@ -159,11 +174,7 @@ def _compilers(document: Document) -> list[Element]:
 
 
 def name_by_content(path: Path, content: str | None = None) -> str:
-    """Return what a file is called in a run.
-
-    Args:
-        path: Where it is.
-        content: What is stored in its place; the file as it is if left out.
+    """Return what a file is called in a run, by what is stored: itself, or a text in its place.
 
     Raises:
         ModelNotFoundError: It cannot be read.
@@ -182,35 +193,6 @@ def is_stored(name: str) -> bool:
     return _STORED.fullmatch(name) is not None
 
 
-def what_else(path: Path) -> str:
-    """Say what is there in place of a regular file; "" if it is one, or nothing is there."""
-    if is_file(path) or not is_there(path):
-        return ""
-    return "a folder" if is_folder(path) else "no regular file"
-
-
-def _asset(
-    element: Element,
-    attribute: str,
-    folders: Folders,
-    compilers: list[dict[str, str]],
-    origin: Path | None,
-) -> Asset:
-    model, name = element.tag == MODEL, element.attributes[attribute]
-    if folders.strip and not model:
-        name = re.split(r"[/\\]", name)[-1]
-    kind = "texturedir" if element.tag == "texture" else "meshdir"
-    given = "" if model else _given(compilers, kind)
-    path = usual = _join(folders.main / _plain(given), name)
-    tried = [usual]
-    if origin is not None:
-        first = _join(_sought(element.tag, folders.main, compilers), name)
-        beside = _join(origin, name)
-        tried += [first, beside]
-        path = usual if is_there(first) else beside
-    return Asset(element, attribute, path, tuple(tried))
-
-
 def _given(compilers: list[dict[str, str]], name: str) -> str:
     """Return the folder that several <compiler> give together: the last word counts."""
     folder = ""
@@ -227,15 +209,6 @@ def _sought(tag: str, main: Path, compilers: list[dict[str, str]]) -> Path:
     kind = {"mesh": "meshdir", "texture": "texturedir"}.get(tag, "")
     folder = "" if tag == "flexcomp" else last.get(kind, "") or last.get("assetdir", "")
     return main / _plain(folder)
-
-
-def is_there(path: Path) -> bool:
-    """Return whether a path leads to something; one that is no path leads to nothing."""
-    try:
-        path.stat()
-    except (OSError, ValueError):
-        return False
-    return True
 
 
 def _join(folder: Path, name: str) -> Path:

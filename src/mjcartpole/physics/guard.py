@@ -16,9 +16,9 @@ from typing import Final
 
 import mujoco
 
-from mjcartpole.errors import ModelError, ModelSyntaxError, NotACartPoleError
+from mjcartpole.errors import ModelError, NotACartPoleError
 from mjcartpole.physics.edit.document import Document
-from mjcartpole.physics.library import libmujoco, one_line
+from mjcartpole.physics.library import invalid, libmujoco, one_line
 
 MEMORY: Final = 768 * 2**20
 """Bytes that a document may take while it is compiled and stepped."""
@@ -61,7 +61,7 @@ def compile_document(document: Document, name: str) -> mujoco.MjModel:
     try:
         return mujoco.MjModel.from_xml_string(text)
     except (ValueError, mujoco.FatalError) as error:
-        raise _invalid(name, str(error)) from error
+        raise invalid(name, error) from error
 
 
 def _is_plain(document: Document) -> bool:
@@ -108,7 +108,7 @@ def _judge(name: str, code: int, answer: str) -> None:
             "must find by simulation, where one plain motor on the slide joint is needed"
         )
     if kind == "INVALID":
-        raise _invalid(name, reason)
+        raise invalid(name, reason)
     if kind:
         raise ModelError(f"MuJoCo gives up on {name}: {one_line(reason)}")
     if code:
@@ -122,7 +122,3 @@ def _too_much(name: str, reason: str) -> ModelError:
         f"({reason}); look for large textures, height fields, "
         "meshes, files and counts, for geoms that all touch and models that attach themselves"
     )
-
-
-def _invalid(name: str, reason: str) -> ModelSyntaxError:
-    return ModelSyntaxError(f"{name} is not a valid MJCF: {one_line(reason)}")

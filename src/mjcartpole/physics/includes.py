@@ -12,19 +12,20 @@ from pathlib import Path
 from typing import Final
 
 from mjcartpole.errors import ModelError, ModelNotFoundError, ModelSyntaxError
+from mjcartpole.files import is_there
 from mjcartpole.physics.assets import (
     MODEL,
     Asset,
     Folders,
+    check_kind,
     find_assets,
-    is_there,
     name_by_content,
     store_names,
     strips,
-    what_else,
     write_paths,
 )
 from mjcartpole.physics.edit.document import Document, Element
+from mjcartpole.physics.library import invalid
 
 LARGEST_FILE: Final = 2**24
 """Bytes of a document, with all that it includes and attaches."""
@@ -34,20 +35,14 @@ MOST_FILES: Final = 50
 
 
 def read_text(path: Path, name: str = "", most: int = LARGEST_FILE) -> str:
-    """Return the text of a file.
-
-    Args:
-        path: Where it is.
-        name: What a person calls it; without one it is the model file of that path.
-        most: How many bytes it may have.
+    """Return the text of a file, called by a name, of so many bytes at most.
 
     Raises:
         ModelNotFoundError: It cannot be read, or is no regular file.
         ModelSyntaxError: It is too large to be a document, or not text in UTF-8.
     """
     name = name or f"model file '{path}'"
-    if kind := what_else(path):
-        raise ModelNotFoundError(f"{name} cannot be read: '{path}' is {kind}")
+    check_kind(path, name)
     try:
         size = path.stat().st_size
         with path.open("rb") as file:
@@ -85,7 +80,7 @@ def read_whole(
     folders = Folders(folder.resolve(), None if inside is None else tuple(inside))
     reader = _Reader(folders, LARGEST_FILE - len(text))
     document, assets = reader.read(text, name)
-    _check_models(reader, assets, name)
+    _check_models(reader, assets, name, set())
     write_paths(document, assets, reader.folders)
     return document
 
@@ -131,7 +126,7 @@ class _Reader:
         root = document.root.tag
         if root != "mujoco":
             urdf = " (a URDF; MuJoCo can save it as MJCF)" if root == "robot" else ""
-            raise _invalid(name, f"its outermost element is <{root}>{urdf}, not <mujoco>")
+            raise invalid(name, f"its outermost element is <{root}>{urdf}, not <mujoco>")
         self.folders = replace(self.folders, strip=self.folders.strip or strips(document))
         assets = find_assets(document, self.folders, origins)
         for asset in assets:
@@ -172,25 +167,25 @@ class _Reader:
     def _included(
         self, include: Element, name: str, origin: Path | None
     ) -> tuple[str, list[Path | None]]:
+        """Return an included file's content: it lies beside the main file, else the includer."""
         file = include.attributes.get("file", "")
-        path = self._included_file(file, name, origin)
-        who = f"'{file}', which {name} includes,"
-        if (real := os.path.realpath(path)) in self.included:
-            raise _invalid(name, f"it includes '{file}' more than once, or in a circle")
-        self.included.add(real)
-        self.folders.check(path, who)
-        return self._flat(self._text(path, who), f"'{file}'", path.parent)
-
-    def _included_file(self, file: str, name: str, origin: Path | None) -> Path:
-        """Find an included file: beside the main file, else beside the one that includes it."""
         if not file:
             raise ModelNotFoundError(
                 f"{name} cannot be read whole: an <include> of it names no file; "
                 'write <include file="..."/>'
             )
-        file = file.replace("\\", "/")
-        usual, beside = self.folders.main / file, (origin or self.folders.main) / file
-        return usual if is_there(usual) or not is_there(beside) else beside
+        path, beside = (
+            folder / file.replace("\\", "/")
+            for folder in (self.folders.main, origin or self.folders.main)
+        )
+        if is_there(beside) and not is_there(path):
+            path = beside
+        if (real := os.path.realpath(path)) in self.included:
+            raise invalid(name, f"it includes '{file}' more than once, or in a circle")
+        self.included.add(real)
+        who = f"'{file}', which {name} includes,"
+        self.folders.check(path, who)
+        return self._flat(self._text(path, who), f"'{file}'", path.parent)
 
     def _text(self, path: Path, who: str) -> str:
         if self.left <= 0:
@@ -203,16 +198,14 @@ class _Reader:
         return text
 
 
-def _check_models(reader: _Reader, assets: list[Asset], name: str) -> None:
+def _check_models(reader: _Reader, assets: list[Asset], name: str, seen: set[str]) -> None:
     """Look at all models that a document attaches, and at their files, each once."""
-    seen: set[str] = set()
-    waiting = [(asset, name) for asset in assets if asset.element.tag == MODEL]
-    while waiting:
-        asset, by = waiting.pop()
-        if (real := os.path.realpath(asset.path)) not in seen:
+    for asset in assets:
+        real = os.path.realpath(asset.path)
+        if asset.element.tag == MODEL and real not in seen:
             seen.add(real)
-            _, theirs = reader.attached(asset, by)
-            waiting += [(each, f"'{asset.name}'") for each in theirs if each.element.tag == MODEL]
+            _, theirs = reader.attached(asset, name)
+            _check_models(reader, theirs, f"'{asset.name}'", seen)
 
 
 def _store(
@@ -234,14 +227,10 @@ def _store(
 
 def _parse(text: str, name: str) -> Document:
     if not text.strip():
-        raise _invalid(name, "it is empty")
+        raise invalid(name, "it is empty")
     if "\0" in text:
-        raise _invalid(name, "it holds a zero byte, so it is not text")
+        raise invalid(name, "it holds a zero byte, so it is not text")
     try:
         return Document(text)
     except ModelSyntaxError as error:
-        raise _invalid(name, str(error)) from error
-
-
-def _invalid(name: str, reason: str) -> ModelSyntaxError:
-    return ModelSyntaxError(f"{name} is not a valid MJCF: {reason}")
+        raise invalid(name, error) from error

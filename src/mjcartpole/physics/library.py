@@ -8,6 +8,8 @@ from typing import Final
 
 import mujoco
 
+from mjcartpole.errors import ModelSyntaxError
+
 
 def libmujoco() -> Path | None:
     """Return the library that the mujoco package brings along, if it is where it is expected."""
@@ -21,6 +23,11 @@ def libmujoco() -> Path | None:
 def one_line(message: object) -> str:
     """Return what MuJoCo says in one line."""
     return " ".join(str(message).split()).removeprefix("XML Error: ").removeprefix("Error: ")
+
+
+def invalid(name: str, reason: object) -> ModelSyntaxError:
+    """Return the error for a document, called by a name, that MuJoCo does not accept."""
+    return ModelSyntaxError(f"{name} is not a valid MJCF: {one_line(reason)}")
 
 
 _ENOUGH: Final = 17

@@ -5,10 +5,10 @@ from collections.abc import Sequence
 
 import mujoco
 
-from mjcartpole.errors import ConfigError, ModelSyntaxError
+from mjcartpole.errors import ConfigError
 from mjcartpole.physics.edit.document import Document, Element
 from mjcartpole.physics.edit.element_path import label_of
-from mjcartpole.physics.library import one_line
+from mjcartpole.physics.library import invalid
 
 
 def number_text(value: float, written: str = "") -> str:
@@ -97,9 +97,7 @@ class Parts:
         try:
             return mujoco.MjSpec.from_string(self.document.text)
         except ValueError as error:
-            raise ModelSyntaxError(
-                f"the edited document is not a valid MJCF: {one_line(error)}"
-            ) from error
+            raise invalid("the edited document", error) from error
 
     def put(self, element: Element, name: str, values: Sequence[float]) -> None:
         """Write numbers into an attribute; those that do not change keep their spelling.
