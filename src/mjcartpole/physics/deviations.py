@@ -77,7 +77,7 @@ def _gravitys_direction(
     square = geometry_of(cartpole, directions(cartpole).up)
     angles = {"rail_tilt", "hinge_tilt", "lean"}
     turned = {name for name in angles if getattr(own, name) != getattr(reference, name)}
-    if turned and not any(getattr(square, name) for name in angles):
+    if turned and not any(square[name] for name in angles):
         phrase = f"gravity {_gravity(cartpole)} instead of {reference.gravity:g} straight down"
         yield Deviation(phrase, frozenset({"gravity", *turned}))
 

@@ -6,8 +6,8 @@
 import copy
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, fields, replace
-from typing import Final, NamedTuple
+from dataclasses import fields, replace
+from typing import Any, Final, NamedTuple
 
 import mujoco
 import numpy as np
@@ -38,35 +38,32 @@ def read_parameters(cartpole: CartPole) -> Parameters:
     """
     if cartpole.poles > 1:
         raise ModelError(f"{cartpole.name} has {several_poles(cartpole)}")
-    model, slider, hinge = cartpole.model, cartpole.slider, cartpole.hinges[0]
-    pole = pole_of(cartpole)
+    model, (slider, hinge), pole = cartpole.model, cartpole.joints, pole_of(cartpole)
     if pole.mass <= 0:
-        name = joint_label(model, hinge)
-        raise NotACartPoleError(f"{cartpole.name}: the pole, {name}, has no mass")
-    bit, motor = mujoco.mjtDisableBit, cartpole.motor
+        raise NotACartPoleError(
+            f"{cartpole.name}: the pole, {joint_label(model, hinge)}, has no mass"
+        )
+    motor, bit, frictions = cartpole.motor, mujoco.mjtDisableBit, _frictions(cartpole)
     gear_squared = float(model.actuator_gear[motor, 0]) ** 2
-    damper = is_on(model, bit.mjDSBL_DAMPER)
-    frictions = _frictions(cartpole)
-    gravity = float(np.linalg.norm(model.opt.gravity)) if is_on(model, bit.mjDSBL_GRAVITY) else 0.0
+    slider_damping = model.dof_damping[slider] + gear_squared * model.actuator_damping[motor]
+    slider_armature = model.dof_armature[slider] + gear_squared * model.actuator_armature[motor]
+    damps, weighs = is_on(model, bit.mjDSBL_DAMPER), is_on(model, bit.mjDSBL_GRAVITY)
     try:
         return Parameters(
             cart_mass=mass_of(model, cart_bodies(cartpole)),
             pole_mass=pole.mass,
             inertia=pole.inertia,
-            gravity=gravity,
-            slider_damping=damper
-            * float(model.dof_damping[slider] + gear_squared * model.actuator_damping[motor]),
-            hinge_damping=damper * float(model.dof_damping[hinge]),
-            motor_damping=feedback_of(cartpole),
-            slider_armature=float(
-                model.dof_armature[slider] + gear_squared * model.actuator_armature[motor]
-            ),
+            gravity=weighs * float(np.linalg.norm(model.opt.gravity)),
+            slider_damping=damps * float(slider_damping),
+            hinge_damping=damps * float(model.dof_damping[hinge]),
+            motor_damping=_feedback(cartpole),
+            slider_armature=float(slider_armature),
             hinge_armature=float(model.dof_armature[hinge]),
             forces=_acting_forces(cartpole),
-            timestep=float(model.opt.timestep),
+            timestep=cartpole.timestep,
             slider_friction=frictions.get(slider),
             hinge_friction=frictions.get(hinge),
-            **geometry_of(cartpole)._asdict(),
+            **geometry_of(cartpole),
         )
     except ValueError as error:
         raise ModelError(f"{cartpole.name} is beyond the equations: {error}") from error
@@ -85,7 +82,7 @@ def can_push(cartpole: CartPole) -> bool:
     return enabled and is_on(model, mujoco.mjtDisableBit.mjDSBL_ACTUATION)
 
 
-def feedback_of(cartpole: CartPole) -> float:
+def _feedback(cartpole: CartPole) -> float:
     """Return how much the motor itself brakes the cart, N s/m: velocity feedback."""
     model, motor = cartpole.model, cartpole.motor
     if model.actuator_biastype[motor] != mujoco.mjtBias.mjBIAS_AFFINE or not can_push(cartpole):
@@ -122,19 +119,8 @@ def _frictions(cartpole: CartPole) -> dict[int, DryFriction]:
     }
 
 
-class _Geometry(NamedTuple):
-    """The parameters that say where the axes and the pole point."""
-
-    com_distance: float
-    hinge_sign: int
-    rail_tilt: float
-    hinge_tilt: float
-    skew: float
-    lean: float
-
-
-def geometry_of(cartpole: CartPole, up: Vector | None = None) -> _Geometry:
-    """Return the angles between rail, hinge, pole and up; what rounding can make is 0.
+def geometry_of(cartpole: CartPole, up: Vector | None = None) -> dict[str, Any]:
+    """Return the parameters that say where the axes and the pole point; what rounding makes is 0.
 
     Args:
         cartpole: A model of one pole.
@@ -149,20 +135,15 @@ def geometry_of(cartpole: CartPole, up: Vector | None = None) -> _Geometry:
     aside = np.cross(axes.hinge, high)
     com = axes.frame @ pole_of(cartpole).com
     above, beside = float(com @ high), float(com @ aside)
-    lean = math.atan2(beside, above) if above >= 0 else math.atan2(-beside, -above)
-    distance = above
-    if abs(beside) > TILT * abs(above):
-        distance = math.copysign(math.hypot(above, beside), above)
-    else:
-        lean = 0.0
-    return _Geometry(
-        com_distance=distance,
-        hinge_sign=-1 if axes.rail @ aside < 0 else 1,
-        rail_tilt=_angle(axes.rail, up),
-        hinge_tilt=_angle(axes.hinge, up),
-        skew=_angle(axes.rail, axes.hinge),
-        lean=lean,
-    )
+    leans, side = abs(beside) > TILT * abs(above), 1 if above >= 0 else -1
+    return {
+        "com_distance": math.copysign(math.hypot(above, beside), above) if leans else above,
+        "hinge_sign": -1 if axes.rail @ aside < 0 else 1,
+        "rail_tilt": _angle(axes.rail, up),
+        "hinge_tilt": _angle(axes.hinge, up),
+        "skew": _angle(axes.rail, axes.hinge),
+        "lean": math.atan2(side * beside, side * above) if leans else 0.0,
+    }
 
 
 def _angle(axis: Vector, other: Vector) -> float:
@@ -222,8 +203,7 @@ def _digits(value: float, other: float) -> str:
     return repr(value)
 
 
-@dataclass(frozen=True)
-class _Pole:
+class _Pole(NamedTuple):
     """All bodies of a pole as one; the frame is that of the hinge's body."""
 
     mass: float  # kg
@@ -274,11 +254,9 @@ def rotation(quaternion: Vector) -> Vector:
 
 
 def forces_of(cartpole: CartPole) -> tuple[float, float]:
-    """Return push along the slider by action 0 and by action 1, N."""
-    model = cartpole.model
-    motor = cartpole.motor
+    """Return push along the slider by action 0 and by action 1, N, whatever clips it."""
+    model, motor, (left, right) = cartpole.model, cartpole.motor, cartpole.controls
     gear, gain = float(model.actuator_gear[motor, 0]), float(model.actuator_gainprm[motor, 0])
-    left, right = cartpole.controls
     return gear * (gain * left), gear * (gain * right)
 
 

@@ -6,6 +6,7 @@ and MuJoCo computes again.
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 from typing import Final
@@ -14,7 +15,7 @@ import mujoco
 import numpy as np
 
 from mjcartpole.errors import ConfigError
-from mjcartpole.physics.bodies import cart_bodies, mass_of, pole_bodies
+from mjcartpole.physics.bodies import mass_of, pole_bodies
 from mjcartpole.physics.cartpole import CartPole, Vector
 from mjcartpole.physics.edit.document import Document, Element
 from mjcartpole.physics.edit.xml_elements import Parts, numbers_of
@@ -28,15 +29,6 @@ _LONG: Final = (mujoco.mjtGeom.mjGEOM_CAPSULE, mujoco.mjtGeom.mjGEOM_CYLINDER)
 
 
 # --- mass ---------------------------------------------------------------------------------------
-
-
-def set_cart_mass(parts: Parts, cartpole: CartPole, mass: float) -> None:
-    """Give the cart another mass; the inertia of what only slides has no effect and stays.
-
-    Raises:
-        ConfigError: There is nothing to scale.
-    """
-    _set_mass(parts, cartpole.model, cart_bodies(cartpole), "cart", mass)
 
 
 def set_pole_mass(parts: Parts, cartpole: CartPole, mass: float, pole: int = 0) -> None:
@@ -58,7 +50,7 @@ def set_pole_mass(parts: Parts, cartpole: CartPole, mass: float, pole: int = 0) 
                 parts.put(inertial, name, [ratio * value for value in numbers_of(inertial, name)])
     if rod is not None:
         rod.write(mass if alone else ratio * rod.mass, rod.length)
-    _set_mass(parts, model, bodies, "pole", mass)
+    set_mass(parts, model, bodies, "pole", mass)
 
 
 def _ratio(new: float, old: float) -> float:
@@ -66,22 +58,25 @@ def _ratio(new: float, old: float) -> float:
     return 1.0 if math.isclose(new, old, rel_tol=1e-14) else new / max(old, mujoco.mjMINVAL)
 
 
-def _set_mass(
+def set_mass(
     parts: Parts, model: mujoco.MjModel, bodies: list[int], what: str, mass: float
 ) -> None:
-    """Scale the masses of bodies to a sum."""
+    """Scale the masses of bodies to a sum.
+
+    Raises:
+        ConfigError: There is nothing to scale; `what` is the part of the cart-pole that has none.
+    """
     heavy = [body for body in bodies if model.body_mass[body] > 0]
     if not heavy:
         raise ConfigError(f"{what}.mass cannot be set: no body of the {what} has a mass to scale")
-    ratio = _ratio(mass, float(sum(float(model.body_mass[body]) for body in heavy)))
+    ratio = _ratio(mass, mass_of(model, heavy))
     for body in heavy:
         inertial = parts.inertial(model, body)
         if inertial is None:
             _scale_geoms(parts, model, body, ratio)
-        elif len(heavy) == 1:
-            parts.put(inertial, "mass", [mass])
         else:
-            parts.put(inertial, "mass", [ratio * float(model.body_mass[body])])
+            alone = len(heavy) == 1
+            parts.put(inertial, "mass", [mass if alone else ratio * float(model.body_mass[body])])
 
 
 def _scale_geoms(parts: Parts, model: mujoco.MjModel, body: int, ratio: float) -> None:
@@ -97,20 +92,28 @@ def _scale_geoms(parts: Parts, model: mujoco.MjModel, body: int, ratio: float) -
 # --- length -------------------------------------------------------------------------------------
 
 
+@dataclass
 class _RodInertial:
     """An <inertial> that is a uniform thin rod from the hinge, along an axis of its body.
 
     Attributes:
+        foot: Of the hinge, m, shape (3,).
+        com: From there to the centre of mass, m, shape (3,).
         mass: kg.
-        length: m, hinge to tip.
+        axis: Along which of the body's it lies.
     """
 
-    def __init__(
-        self, parts: Parts, element: Element, foot: Vector, com: Vector, mass: float, axis: int
-    ) -> None:
-        self.mass, self.length = mass, 2 * abs(float(com[axis]))
-        self._parts, self._element, self._axis = parts, element, axis
-        self._foot, self._side = foot, math.copysign(1.0, com[axis])
+    parts: Parts
+    element: Element
+    foot: Vector
+    com: Vector
+    mass: float
+    axis: int
+
+    @property
+    def length(self) -> float:
+        """From the hinge to the tip, m."""
+        return 2 * abs(float(self.com[self.axis]))
 
     @classmethod
     def of(cls, parts: Parts, cartpole: CartPole, pole: int) -> "_RodInertial | None":
@@ -133,17 +136,16 @@ class _RodInertial:
 
     def write(self, mass: float, length: float) -> None:
         """Give the rod another mass and length; its thickness stays."""
-        pos, inertia = numbers_of(self._element, "pos"), numbers_of(self._element, "diaginertia")
-        across, axis = uniform_rod_inertia(mass, length), self._axis
+        pos, inertia = numbers_of(self.element, "pos"), numbers_of(self.element, "diaginertia")
+        across, axis = uniform_rod_inertia(mass, length), self.axis
         along = inertia[axis]
         if mass != self.mass:
             along = float(f"{along * (mass / self.mass):.12g}")  # nothing turns it: no noise
         inertia = [across] * 3
         inertia[axis] = min(along, across)  # for a pole thicker than long
-        pos[axis] = float(self._foot[axis]) + self._side * length / 2
-        self._parts.put(self._element, "pos", pos)
-        self._parts.put(self._element, "mass", [mass])
-        self._parts.put(self._element, "diaginertia", inertia)
+        pos[axis] = float(self.foot[axis]) + math.copysign(1.0, self.com[axis]) * length / 2
+        for name, values in (("pos", pos), ("mass", [mass]), ("diaginertia", inertia)):
+            self.parts.put(self.element, name, values)
 
 
 def uniform_rod_inertia(mass: float, length: float) -> float:
@@ -237,15 +239,12 @@ class _Stretch:
         """Return a point in the frame of the pole's body."""
         arm = np.array(point) - self.foot
         if self.axis is not None:
-            moved = list(point)
-            moved[self.axis] = float(self.foot[self.axis]) + self.value(float(arm[self.axis]))
-            return moved
+            along = float(self.foot[self.axis]) + self.value(float(arm[self.axis]))
+            return [along if axis == self.axis else old for axis, old in enumerate(point)]
         if np.linalg.norm(np.cross(arm, self.along)) <= 1e-12 * np.linalg.norm(arm):
             return [float(a) + self.value(float(b)) for a, b in zip(self.foot, arm, strict=True)]
-        return [
-            float(x)
-            for x in point + (_ratio(self.new, self.old) - 1) * (arm @ self.along) * self.along
-        ]
+        moved = point + (_ratio(self.new, self.old) - 1) * (arm @ self.along) * self.along
+        return [float(value) for value in moved]
 
     def reach(self) -> float:
         """Return how far the pole reaches from the hinge: its geoms' axes, without round ends."""

@@ -16,7 +16,7 @@ from mjcartpole.physics.build import build
 from mjcartpole.physics.cartpole import CartPole, Vector
 from mjcartpole.physics.edit.document import Document, Element
 from mjcartpole.physics.edit.element_path import find_element
-from mjcartpole.physics.edit.rescale import set_cart_mass, set_length, set_pole_mass
+from mjcartpole.physics.edit.rescale import set_length, set_mass, set_pole_mass
 from mjcartpole.physics.edit.xml_elements import Parts, number_text
 from mjcartpole.physics.parameters import forces_of, pole_of
 
@@ -120,7 +120,7 @@ def apply_meanings(document: Document, values: Mapping[str, float], name: str) -
     if "force" in whole:
         _edit_force(parts, cartpole, whole["force"])
     if "cart.mass" in whole:
-        set_cart_mass(parts, cartpole, whole["cart.mass"])
+        set_mass(parts, cartpole.model, cart_bodies(cartpole), "cart", whole["cart.mass"])
     centres = [_edit_pole(document, cartpole, pole, wanted) for pole, wanted in enumerate(by_pole)]
     name += f" with {', '.join(f'{key}={value:g}' for key, value in values.items())}"
     after = build(document.text, name, own_timestep=True)
