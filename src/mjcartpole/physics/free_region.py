@@ -74,11 +74,9 @@ class FreeRegion:
 
     def holds(self, states: Vector) -> npt.NDArray[np.bool_]:
         """Return whether each of many states, shape (..., 4), lies in it."""
-        (x_low, x_high), (theta_low, theta_high) = self.x, self.theta
-        x, theta = states[..., 0], states[..., 2]
-        inside: npt.NDArray[np.bool_] = (
-            (x >= x_low) & (x <= x_high) & (theta >= theta_low) & (theta <= theta_high)
-        )
+        low, high = np.transpose([self.x, self.theta])
+        places = states[..., [0, 2]]
+        inside: npt.NDArray[np.bool_] = ((low <= places) & (places <= high)).all(axis=-1)
         return inside
 
     def holds_for_a_step(self, states: Vector, p: Parameters) -> npt.NDArray[np.bool_]:
@@ -133,7 +131,7 @@ def _ended(interval: Interval, end: float) -> Interval:
 def _by_limits(cartpole: CartPole, task: Task) -> FreeRegion:
     model, bit = cartpole.model, mujoco.mjtDisableBit
     bounds, blocked, intervals = [], [], []
-    acting = is_on(model, bit.mjDSBL_CONSTRAINT) and is_on(model, bit.mjDSBL_LIMIT)
+    acting = is_on(model, bit.mjDSBL_CONSTRAINT, bit.mjDSBL_LIMIT)
     wide = wide_box(task)[::2]
     for joint, own, end in zip(cartpole.joints[:2], _limits(task), wide, strict=True):
         interval = ANYWHERE
@@ -151,8 +149,7 @@ def _by_limits(cartpole: CartPole, task: Task) -> FreeRegion:
 
 def _no_contacts(model: mujoco.MjModel) -> bool:
     bit = mujoco.mjtDisableBit
-    acting = is_on(model, bit.mjDSBL_CONSTRAINT) and is_on(model, bit.mjDSBL_CONTACT)
-    return not acting or nothing_can_touch(model)
+    return nothing_can_touch(model) or not is_on(model, bit.mjDSBL_CONSTRAINT, bit.mjDSBL_CONTACT)
 
 
 def _touching(cartpole: CartPole, region: FreeRegion) -> list[str]:

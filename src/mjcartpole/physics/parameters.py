@@ -69,9 +69,9 @@ def read_parameters(cartpole: CartPole) -> Parameters:
         raise ModelError(f"{cartpole.name} is beyond the equations: {error}") from error
 
 
-def is_on(model: mujoco.MjModel, flag: mujoco.mjtDisableBit) -> bool:
-    """Return whether a model's option flags leave something switched on."""
-    return not model.opt.disableflags & int(flag)
+def is_on(model: mujoco.MjModel, *flags: mujoco.mjtDisableBit) -> bool:
+    """Return whether a model's option flags leave all of these switched on."""
+    return not any(model.opt.disableflags & int(flag) for flag in flags)
 
 
 def can_push(cartpole: CartPole) -> bool:

@@ -177,13 +177,14 @@ def idle_numbers(cartpole: CartPole, *, task: Task = CARTPOLE_V1) -> list[str]:
     model, bit, region = cartpole.model, mujoco.mjtDisableBit, free_region(cartpole, task=task)
     found = list(region.bounds) if region.covers_task else []
     for joint in cartpole.joints:
-        name = joint_label(model, joint)
-        if model.dof_damping[joint] and not is_on(model, bit.mjDSBL_DAMPER):
-            found.append(f"damping of {name}, switched off by an option flag")
-        if model.jnt_stiffness[joint] and not is_on(model, bit.mjDSBL_SPRING):
-            found.append(f"stiffness of {name}, switched off by an option flag")
-        if model.dof_frictionloss[joint] and not is_on(model, bit.mjDSBL_FRICTIONLOSS):
-            found.append(f"friction loss of {name}, switched off by an option flag")
+        for what, values, flag in (
+            ("damping", model.dof_damping, bit.mjDSBL_DAMPER),
+            ("stiffness", model.jnt_stiffness, bit.mjDSBL_SPRING),
+            ("friction loss", model.dof_frictionloss, bit.mjDSBL_FRICTIONLOSS),
+        ):
+            if values[joint] and not is_on(model, flag):
+                name = joint_label(model, joint)
+                found.append(f"{what} of {name}, switched off by an option flag")
     if cartpole.integrator != "Euler" and not beyond_step(cartpole, task=task):
         found.append(f"integrator {cartpole.integrator}, whose steps are Euler's here")
     if not is_on(model, bit.mjDSBL_GRAVITY) and model.opt.gravity.any():
@@ -215,7 +216,7 @@ def _joints(cartpole: CartPole) -> Iterator[Effect]:
     """Yield springs, damping that is not viscous, and dry friction that is not solved exactly."""
     model, bit = cartpole.model, mujoco.mjtDisableBit
     solver = _inexact_solver(model)
-    constrained = is_on(model, bit.mjDSBL_CONSTRAINT) and is_on(model, bit.mjDSBL_FRICTIONLOSS)
+    constrained = is_on(model, bit.mjDSBL_CONSTRAINT, bit.mjDSBL_FRICTIONLOSS)
     for joint in cartpole.joints:
         name = joint_label(model, joint)
         if model.dof_frictionloss[joint] and constrained and solver:
@@ -250,7 +251,7 @@ def _actuator(cartpole: CartPole) -> Iterator[Effect]:
 def _ties(cartpole: CartPole) -> Iterator[Effect]:
     """Yield equality constraints, tendons, deformable things and plugins."""
     model, bit = cartpole.model, mujoco.mjtDisableBit
-    if is_on(model, bit.mjDSBL_EQUALITY) and is_on(model, bit.mjDSBL_CONSTRAINT):
+    if is_on(model, bit.mjDSBL_EQUALITY, bit.mjDSBL_CONSTRAINT):
         for index in np.flatnonzero(model.eq_active0).tolist():
             name = label(model, mujoco.mjtObj.mjOBJ_EQUALITY, index, "")
             yield "qfrc_constraint", f"equality constraint {name}"

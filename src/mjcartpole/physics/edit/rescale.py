@@ -31,18 +31,17 @@ _LONG: Final = (mujoco.mjtGeom.mjGEOM_CAPSULE, mujoco.mjtGeom.mjGEOM_CYLINDER)
 # --- mass ---------------------------------------------------------------------------------------
 
 
-def set_pole_mass(parts: Parts, cartpole: CartPole, mass: float, pole: int = 0) -> None:
+def set_pole_mass(parts: Parts, mass: float, pole: int = 0) -> None:
     """Give a pole another mass, with the inertia that follows.
 
     Raises:
         ConfigError: There is nothing to scale.
     """
-    model, bodies = cartpole.model, pole_bodies(cartpole, pole)
-    rod = _RodInertial.of(parts, cartpole, pole)
+    model, bodies = parts.cartpole.model, pole_bodies(parts.cartpole, pole)
+    rod, ratio = _RodInertial.of(parts, pole), _ratio(mass, mass_of(model, bodies))
     alone = len([body for body in bodies if model.body_mass[body] > 0]) == 1
-    ratio = _ratio(mass, mass_of(model, bodies))
     for body in bodies:
-        inertial = parts.inertial(model, body)
+        inertial = parts.inertial(body)
         if inertial is None or (rod is not None and body == bodies[0]):
             continue
         for name in ("diaginertia", "fullinertia"):
@@ -50,7 +49,7 @@ def set_pole_mass(parts: Parts, cartpole: CartPole, mass: float, pole: int = 0) 
                 parts.put(inertial, name, [ratio * value for value in numbers_of(inertial, name)])
     if rod is not None:
         rod.write(mass if alone else ratio * rod.mass, rod.length)
-    set_mass(parts, model, bodies, "pole", mass)
+    set_mass(parts, bodies, "pole", mass)
 
 
 def _ratio(new: float, old: float) -> float:
@@ -58,31 +57,30 @@ def _ratio(new: float, old: float) -> float:
     return 1.0 if math.isclose(new, old, rel_tol=1e-14) else new / max(old, mujoco.mjMINVAL)
 
 
-def set_mass(
-    parts: Parts, model: mujoco.MjModel, bodies: list[int], what: str, mass: float
-) -> None:
+def set_mass(parts: Parts, bodies: list[int], what: str, mass: float) -> None:
     """Scale the masses of bodies to a sum.
 
     Raises:
         ConfigError: There is nothing to scale; `what` is the part of the cart-pole that has none.
     """
+    model = parts.cartpole.model
     heavy = [body for body in bodies if model.body_mass[body] > 0]
     if not heavy:
         raise ConfigError(f"{what}.mass cannot be set: no body of the {what} has a mass to scale")
     ratio = _ratio(mass, mass_of(model, heavy))
     for body in heavy:
-        inertial = parts.inertial(model, body)
+        inertial = parts.inertial(body)
         if inertial is None:
-            _scale_geoms(parts, model, body, ratio)
+            _scale_geoms(parts, body, ratio)
         else:
             alone = len(heavy) == 1
             parts.put(inertial, "mass", [mass if alone else ratio * float(model.body_mass[body])])
 
 
-def _scale_geoms(parts: Parts, model: mujoco.MjModel, body: int, ratio: float) -> None:
+def _scale_geoms(parts: Parts, body: int, ratio: float) -> None:
     if ratio == 1:
         return
-    for _, element, geom in parts.geoms(model, body):
+    for _, element, geom in parts.geoms(body):
         if math.isnan(geom.mass):
             parts.put(element, "density", [ratio * float(geom.density)])
         elif geom.mass > 0:
@@ -116,11 +114,11 @@ class _RodInertial:
         return 2 * abs(float(self.com[self.axis]))
 
     @classmethod
-    def of(cls, parts: Parts, cartpole: CartPole, pole: int) -> "_RodInertial | None":
+    def of(cls, parts: Parts, pole: int) -> "_RodInertial | None":
         """Return a pole's own; None if it has none, or is no such rod."""
-        model, hinge = cartpole.model, cartpole.hinges[pole]
+        model, hinge = parts.cartpole.model, parts.cartpole.hinges[pole]
         root = int(model.jnt_bodyid[hinge])
-        element = parts.inertial(model, root)
+        element = parts.inertial(root)
         if element is None or _TURNED & set(element.attributes):
             return None
         foot = np.array(model.jnt_pos[hinge])
@@ -159,7 +157,7 @@ def uniform_rod_inertia(mass: float, length: float) -> float:
         return math.inf
 
 
-def set_length(parts: Parts, cartpole: CartPole, length: float, pole: int = 0) -> float:
+def set_length(parts: Parts, length: float, pole: int = 0) -> float:
     """Give a pole another length, hinge to tip: everything on it moves along.
 
     Bodies that are fixed to the pole, and poles that stand on it, keep their shape and move.
@@ -170,17 +168,16 @@ def set_length(parts: Parts, cartpole: CartPole, length: float, pole: int = 0) -
     Raises:
         ConfigError: The pole cannot be stretched; the reason is said.
     """
-    model, root = cartpole.model, int(cartpole.model.jnt_bodyid[cartpole.hinges[pole]])
-    rod, stretch = _measured(parts, cartpole, pole)
+    rod, stretch = _measured(parts, pole)
     stretch.new = length
-    inertial = parts.inertial(model, root)
+    inertial = parts.inertial(stretch.root)
     if rod is not None:
         rod.write(rod.mass, length)
     elif inertial is not None:
         stretch.inertial(inertial)
     stretch.geoms()
     for tag in ("site", "body", "camera", "light"):
-        for element in parts.body(model, root).find(tag):
+        for element in parts.body(stretch.root).find(tag):
             if element.parent is not None and element.parent.tag == "frame":
                 raise ConfigError("pole.length cannot be set: the pole has a <frame>")
             if "pos" in element.attributes:
@@ -194,16 +191,12 @@ def length_of(cartpole: CartPole, pole: int = 0) -> float:
     Raises:
         ConfigError: The document does not show it; the reason is said.
     """
-    return _measured(Parts(Document(cartpole.xml)), cartpole, pole)[1].old
+    return _measured(Parts(Document(cartpole.xml), cartpole), pole)[1].old
 
 
-def _measured(
-    parts: Parts, cartpole: CartPole, pole: int
-) -> "tuple[_RodInertial | None, _Stretch]":
+def _measured(parts: Parts, pole: int) -> "tuple[_RodInertial | None, _Stretch]":
     """Return a pole's rod, if it is one, and a stretch that knows how long the pole is."""
-    model, hinge = cartpole.model, cartpole.hinges[pole]
-    root, com = int(model.jnt_bodyid[hinge]), pole_of(cartpole, pole).com
-    rod, stretch = _RodInertial.of(parts, cartpole, pole), _Stretch(parts, model, hinge, com, root)
+    rod, stretch = _RodInertial.of(parts, pole), _Stretch(parts, pole)
     stretch.old = rod.length if rod else stretch.reach()
     return rod, stretch
 
@@ -211,17 +204,19 @@ def _measured(
 class _Stretch:
     """From one length to another, along the pole and from the hinge."""
 
-    def __init__(
-        self, parts: Parts, model: mujoco.MjModel, hinge: int, com: Vector, root: int
-    ) -> None:
+    def __init__(self, parts: Parts, pole: int) -> None:
+        self.parts, self.model = parts, parts.cartpole.model
+        com, hinge = pole_of(parts.cartpole, pole).com, parts.cartpole.hinges[pole]
         distance = float(np.linalg.norm(com))
         if distance < 1e-9:
             raise ConfigError(
                 "pole.length cannot be set: the pole's centre of mass is at the hinge, so it has "
                 "no direction"
             )
-        self.parts, self.model, self.root = parts, model, root
-        self.foot = np.array(model.jnt_pos[hinge])
+        self.root, self.foot = (
+            int(self.model.jnt_bodyid[hinge]),
+            np.array(self.model.jnt_pos[hinge]),
+        )
         along = com / distance
         axis = int(np.abs(along).argmax())
         self.axis = axis if abs(along[axis]) > 1 - 1e-15 else None
@@ -285,7 +280,7 @@ class _Stretch:
 
     @cached_property
     def _geoms(self) -> list[tuple[int, Element, mujoco.MjsGeom]]:
-        return self.parts.geoms(self.model, self.root)
+        return self.parts.geoms(self.root)
 
     def _resize(self, index: int, element: Element, geom: mujoco.MjsGeom) -> None:
         kind, size = int(self.model.geom_type[index]), [float(value) for value in geom.size]

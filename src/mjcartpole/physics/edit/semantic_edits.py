@@ -115,12 +115,12 @@ def apply_meanings(document: Document, values: Mapping[str, float], name: str) -
     cartpole = build(document.text, name, own_timestep=True)
     whole, by_pole = _sort_by_pole(values, cartpole.poles)
     _edit_options(document, cartpole.model, whole)
-    parts = Parts(document)
-    _edit_joint(parts, cartpole, cartpole.slider, "rail", whole)
+    parts = Parts(document, cartpole)
+    _edit_joint(parts, cartpole.slider, "rail", whole)
     if "force" in whole:
-        _edit_force(parts, cartpole, whole["force"])
+        _edit_force(parts, whole["force"])
     if "cart.mass" in whole:
-        set_mass(parts, cartpole.model, cart_bodies(cartpole), "cart", whole["cart.mass"])
+        set_mass(parts, cart_bodies(cartpole), "cart", whole["cart.mass"])
     centres = [_edit_pole(document, cartpole, pole, wanted) for pole, wanted in enumerate(by_pole)]
     name += f" with {', '.join(f'{key}={value:g}' for key, value in values.items())}"
     after = build(document.text, name, own_timestep=True)
@@ -163,12 +163,12 @@ def _edit_pole(
     """Make the edits of one pole; returns where its centre of mass must then be, from the hinge."""
     wanted, longer = pole_of(before, pole), 1.0
     if values:
-        _edit_joint(Parts(document), before, before.hinges[pole], "hinge", values)
+        _edit_joint(Parts(document, before), before.hinges[pole], "hinge", values)
     if "pole.length" in values:
-        longer = set_length(Parts(document), before, values["pole.length"], pole)
+        longer = set_length(Parts(document, before), values["pole.length"], pole)
     if "pole.length" in values or "pole.mass" in values:
         stretched = build(document.text, before.name, own_timestep=True)
-        set_pole_mass(Parts(document), stretched, values.get("pole.mass", wanted.mass), pole)
+        set_pole_mass(Parts(document, stretched), values.get("pole.mass", wanted.mass), pole)
     return longer * wanted.com
 
 
@@ -191,15 +191,13 @@ def _set_first(document: Document, element: Element, name: str, value: float) ->
     document.set(element, name, " ".join(tokens))
 
 
-def _edit_joint(
-    parts: Parts, cartpole: CartPole, joint: int, part: str, values: Mapping[str, float]
-) -> None:
+def _edit_joint(parts: Parts, joint: int, part: str, values: Mapping[str, float]) -> None:
     for word, name in _JOINT_ATTRIBUTES.items():
         value = values.get(f"{part}.{word}")
         if value is None:
             continue
-        element = parts.joint(cartpole.model, joint)
-        if name in element.attributes or value != _joint_value(cartpole, joint, name):
+        element = parts.joint(joint)
+        if name in element.attributes or value != _joint_value(parts.cartpole, joint, name):
             _set_first(parts.document, element, name, value)
 
 
@@ -207,10 +205,10 @@ def _joint_value(cartpole: CartPole, joint: int, name: str) -> float:
     return float(getattr(cartpole.model, f"dof_{name}")[joint])
 
 
-def _edit_force(parts: Parts, cartpole: CartPole, force: float) -> None:
+def _edit_force(parts: Parts, force: float) -> None:
     """Set the force through the gear, which is what force there is per unit of control."""
-    model, motor = cartpole.model, cartpole.motor
-    left, right = forces_of(cartpole)
+    model, motor = parts.cartpole.model, parts.cartpole.motor
+    left, right = forces_of(parts.cartpole)
     fixed = model.actuator_gaintype[motor] == mujoco.mjtGain.mjGAIN_FIXED
     if not fixed or model.actuator_biastype[motor] != mujoco.mjtBias.mjBIAS_NONE:
         raise ConfigError("force cannot be set: the actuator is no plain motor; edit it by name")
@@ -221,7 +219,7 @@ def _edit_force(parts: Parts, cartpole: CartPole, force: float) -> None:
         )
     before = float(model.actuator_gear[motor, 0])
     gear = math.copysign(force / abs(right / before), before)
-    element = parts.actuator(motor)
+    element = parts.motor()
     if "gear" in element.attributes or gear != before:
         _set_first(parts.document, element, "gear", gear)
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 import mujoco
 
 from mjcartpole.errors import ConfigError
+from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.edit.document import Document, Element
 from mjcartpole.physics.edit.element_path import label_of
 from mjcartpole.physics.library import invalid
@@ -27,20 +28,21 @@ class Parts:
 
     Attributes:
         document: The document; nothing may be put into it while this is in use.
+        cartpole: What it compiles to, but for numbers that were edited since.
     """
 
-    def __init__(self, document: Document) -> None:
-        self.document = document
+    def __init__(self, document: Document, cartpole: CartPole) -> None:
+        self.document, self.cartpole, self._model = document, cartpole, cartpole.model
         worlds = [child for child in document.root.children if child.tag == "worldbody"]
         self._bodies = [each for world in worlds for each in world.walk() if each.tag == "body"]
 
-    def body(self, model: mujoco.MjModel, index: int) -> Element:
+    def body(self, index: int) -> Element:
         """Return the element of a body.
 
         Raises:
             ConfigError: The document does not write its bodies one by one.
         """
-        names = [model.body(i).name for i in range(1, model.nbody)]
+        names = [self._model.body(i).name for i in range(1, self._model.nbody)]
         if [body.name for body in self._bodies] != names:
             raise ConfigError(
                 "this cannot be edited by meaning: the document does not write every body itself "
@@ -48,14 +50,15 @@ class Parts:
             )
         return self._bodies[index - 1]
 
-    def joint(self, model: mujoco.MjModel, index: int) -> Element:
+    def joint(self, index: int) -> Element:
         """Return the element of a joint.
 
         Raises:
             ConfigError: Not all joints of its body are in the document.
         """
+        model = self._model
         body = int(model.jnt_bodyid[index])
-        found = self.body(model, body).find("joint")
+        found = self.body(body).find("joint")
         if len(found) != int(model.body_jntnum[body]):
             raise ConfigError(
                 f"the joints of body {model.body(body).name!r} cannot be edited by meaning: not "
@@ -63,41 +66,40 @@ class Parts:
             )
         return found[index - int(model.body_jntadr[body])]
 
-    def geoms(self, model: mujoco.MjModel, body: int) -> list[tuple[int, Element, mujoco.MjsGeom]]:
+    def geoms(self, body: int) -> list[tuple[int, Element, mujoco.MjsGeom]]:
         """Return index, element, and what it says with its defaults, of each geom of a body.
 
         Raises:
             ConfigError: Some are not written in the body.
             ModelSyntaxError: An edit has left a number that MuJoCo does not read.
         """
-        elements = self.body(model, body).find("geom")
+        model = self._model
+        elements = self.body(body).find("geom")
         first = int(model.body_geomadr[body])
         if len(elements) != int(model.body_geomnum[body]):
             raise ConfigError(
                 f"the geoms of body '{model.body(body).name}' cannot be edited by meaning: not all "
                 "of them are in the document; edit by element"
             )
-        whole = [geom for each in self._spec().bodies for geom in each.geoms]
+        try:
+            spec = mujoco.MjSpec.from_string(self.document.text)
+        except ValueError as error:
+            raise invalid("the edited document", error) from error
+        whole = [geom for each in spec.bodies for geom in each.geoms]
         return [(first + i, element, whole[first + i]) for i, element in enumerate(elements)]
 
-    def actuator(self, index: int) -> Element:
-        """Return the element of an actuator, by its number in the compiled model."""
+    def motor(self) -> Element:
+        """Return the element of the motor that the actions control."""
         sections = [child for child in self.document.root.children if child.tag == "actuator"]
-        return [child for section in sections for child in section.children][index]
+        return [child for section in sections for child in section.children][self.cartpole.motor]
 
-    def inertial(self, model: mujoco.MjModel, body: int) -> Element | None:
+    def inertial(self, body: int) -> Element | None:
         """Return the <inertial> that decides a body's mass; None where geoms do."""
-        found = self.body(model, body).find("inertial")
+        found = self.body(body).find("inertial")
         compilers = [each for each in self.document.root.children if each.tag == "compiler"]
         said = [each.attributes.get("inertiafromgeom", "") for each in compilers]
         from_geoms = [each for each in said if each][-1:] == ["true"]
         return found[0] if found and not from_geoms else None
-
-    def _spec(self) -> mujoco.MjSpec:
-        try:
-            return mujoco.MjSpec.from_string(self.document.text)
-        except ValueError as error:
-            raise invalid("the edited document", error) from error
 
     def put(self, element: Element, name: str, values: Sequence[float]) -> None:
         """Write numbers into an attribute; those that do not change keep their spelling.
