@@ -1,4 +1,4 @@
-"""What `mjcartpole render` leaves and says; opened again by imageio's ffmpeg and by Pillow."""
+"""What `mjcartpole render` leaves and says; opened again by PyAV and by Pillow."""
 
 import os
 import re
@@ -10,7 +10,7 @@ import sys
 import time
 from pathlib import Path
 
-import imageio_ffmpeg
+import av
 import numpy as np
 import pytest
 from PIL import Image
@@ -64,15 +64,14 @@ def steps_of(run, episodes=1, **choice):
 
 
 def mp4(path):
-    """Frames and rate of an mp4, as imageio's ffmpeg reads it."""
-    command = [imageio_ffmpeg.get_ffmpeg_exe(), "-hide_banner", "-i", str(path)]
-    raw = [*command, "-f", "rawvideo", "-pix_fmt", "rgb24", "-"]
-    done = subprocess.run(raw, capture_output=True, check=True, timeout=60)
-    line = next(line for line in done.stderr.decode().splitlines() if "Video: h264" in line)
-    width, height, fps = map(int, re.search(r"yuv420p.*, (\d+)x(\d+).* (\d+) fps", line).groups())
-    frames = np.frombuffer(done.stdout, np.uint8).reshape(-1, height, width, 3)
-    count, seconds = imageio_ffmpeg.count_frames_and_secs(str(path))
-    assert (count, seconds) == (len(frames), pytest.approx(len(frames) / fps, abs=0.011))
+    """Frames and rate of an mp4, as FFmpeg reads it."""
+    with av.open(str(path)) as container:
+        stream = container.streams.video[0]
+        assert (stream.codec.name, stream.pix_fmt) == ("h264", "yuv420p")
+        pictures = [frame.to_ndarray(format="rgb24") for frame in container.decode(stream)]
+        seconds = container.duration / av.time_base
+    frames, fps = np.array(pictures), int(stream.average_rate)
+    assert seconds == pytest.approx(len(frames) / fps, abs=0.011)
     return frames, fps
 
 

@@ -21,7 +21,7 @@ from mjcartpole.errors import ConfigError, ModelNotFoundError
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.episodes import Episode, EpisodeLog
 from mjcartpole.learning.training import TrainResult, train
-from mjcartpole.media.encoders import find_ffmpeg
+from mjcartpole.media.mp4 import why_no_mp4
 from mjcartpole.physics.load import load_model, models_folder
 
 REFERENCE = (models_folder() / "cartpole.xml").read_text(encoding="utf-8")
@@ -29,7 +29,7 @@ LIGHT = REFERENCE.replace('gravity="0 0 -9.8"', 'gravity="0 0 -3"')
 assert LIGHT != REFERENCE
 BROKEN = "<mujoco><wordbody/></mujoco>"
 NO_CARTPOLE = "<mujoco><worldbody><geom size='1'/></worldbody></mujoco>"
-SUFFIX = ".mp4" if find_ffmpeg() else ".gif"
+SUFFIX = ".gif" if why_no_mp4() else ".mp4"
 
 SCRIPT = """
 import sys

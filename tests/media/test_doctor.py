@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from mjcartpole.media import doctor, encoders, gl
+from mjcartpole.media import doctor, gl, mp4
 
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="hides Linux's libraries")
 CODE = """
@@ -57,8 +57,8 @@ def test_it_names_versions_and_the_driver():
         assert bool(one.driver) == one.works
         assert one.name in text
     assert f"frames are drawn by {report.renderer}" in text
-    if report.ffmpeg:
-        assert f"ffmpeg {report.ffmpeg.version} with libx264" in text
+    assert report.no_mp4 == ""
+    assert "mp4 by PyAV's libx264" in text
     json.dumps(report.as_dict())
 
 
@@ -146,12 +146,12 @@ def test_what_to_install_depends_on_the_system(monkeypatch, release, egl, osmesa
 
 
 def test_without_an_encoder_it_says_so(monkeypatch):
-    monkeypatch.setitem(encoders.SOURCES, "imageio-ffmpeg", lambda: "")
-    monkeypatch.setenv("PATH", "/nowhere")
-    monkeypatch.delenv(encoders.VARIABLE, raising=False)
+    monkeypatch.setattr(mp4, "CODEC", "libx999")
+    mp4.why_no_mp4.cache_clear()
     report = doctor.examine()
-    assert report.ffmpeg is None
-    assert "no H.264 encoder: a gif is written instead of an mp4" in report.text()
+    mp4.why_no_mp4.cache_clear()
+    assert "was built without libx999" in report.no_mp4
+    assert f"a gif is written instead of an mp4: {report.no_mp4}" in report.text()
 
 
 def test_it_touches_no_opengl():

@@ -134,7 +134,7 @@ def test_importing_media_brings_neither_opengl_nor_imageio():
         import sys
         import mjcartpole.media.gl, mjcartpole.media.renderer, mjcartpole.media.sketch
         import mjcartpole.media.video
-        print([name for name in ("OpenGL", "imageio", "imageio_ffmpeg") if name in sys.modules])
+        print([name for name in ("OpenGL", "imageio", "av") if name in sys.modules])
         """
     )
     assert done.stdout.strip() == "[]", done.stderr

@@ -17,7 +17,7 @@ from mjcartpole.learning import runs
 from mjcartpole.learning.documents import read_summary
 from mjcartpole.learning.naming import shortened
 from mjcartpole.learning.training import TrainResult
-from mjcartpole.media.encoders import find_ffmpeg
+from mjcartpole.media.mp4 import why_no_mp4
 from mjcartpole.media.video import Video, write_video
 from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.signals import Interrupted, StopSignals
@@ -48,7 +48,7 @@ def default_path(setups: Sequence[PolicySetup], suffix: str, overwrite: bool = F
 
 def instead_of(path: Path, suffix: str) -> list[Path]:
     """Return what may be written here in place of a film."""
-    return [path.with_suffix(other) for other in _INSTEAD.get(suffix, ()) if not find_ffmpeg()]
+    return [path.with_suffix(other) for other in _INSTEAD.get(suffix, ()) if why_no_mp4()]
 
 
 def film(casts: Casts, look: VideoOptions, path: Path, signals: StopSignals) -> Path:

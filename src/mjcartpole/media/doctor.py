@@ -1,4 +1,4 @@
-"""What there is for pictures and videos here, what there is not, and what to install for it."""
+"""The doctor: what there is for pictures and videos here, what not, and what to install."""
 
 import os
 import platform
@@ -7,9 +7,9 @@ from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass
 from typing import Any, Final, get_args
 
-from mjcartpole.media import encoders, gl
+from mjcartpole.media import gl
 from mjcartpole.media.backend_probe import Backend, Trial, try_backend
-from mjcartpole.media.encoders import FFmpeg
+from mjcartpole.media.mp4 import CODEC, why_no_mp4
 from mjcartpole.versions import version_of
 
 PACKAGES: Final = (
@@ -20,7 +20,8 @@ PACKAGES: Final = (
     "numpy",
     "numba",
     "pillow",
-    "imageio-ffmpeg",
+    "imageio",
+    "av",
 )
 """Whose versions are of interest."""
 
@@ -30,25 +31,23 @@ VARIABLES: Final = (
     "WAYLAND_DISPLAY",
     "PYOPENGL_PLATFORM",
     "MUJOCO_EGL_DEVICE_ID",
-    encoders.VARIABLE,
 )
-"""Environment variables that decide who draws and who encodes."""
+"""Environment variables that decide who draws."""
 
 # What brings each backend on each family of Linux; Debian's were tried on a bare Debian 12.
 _INSTALL: Final = {
     "debian": (
         "apt-get install",
-        {"egl": "libegl1 libgl1", "osmesa": "libosmesa6", "glfw": "libgl1", "ffmpeg": "ffmpeg"},
+        {"egl": "libegl1 libgl1", "osmesa": "libosmesa6", "glfw": "libgl1"},
     ),
     "fedora": (
         "dnf install",
         {
             "egl": "mesa-libEGL mesa-libGL mesa-dri-drivers",
             "glfw": "mesa-libGL mesa-dri-drivers",
-            "ffmpeg": "ffmpeg-free",
         },
     ),
-    "arch": ("pacman -S", {"egl": "mesa", "glfw": "mesa", "ffmpeg": "ffmpeg"}),
+    "arch": ("pacman -S", {"egl": "mesa", "glfw": "mesa"}),
 }
 _SCREENLESS: Final = "needs a screen; for a virtual one: {}, then xvfb-run -a <command>"
 _XVFB: Final = {
@@ -87,7 +86,7 @@ class Report:
         system: The operating system, the machine and Python.
         versions: Of the packages; None for one that is not installed.
         environment: The variables that are set; what is wrong with a value stands behind it.
-        ffmpegs: Every place where an ffmpeg is looked for, in that order.
+        no_mp4: Why a gif is written instead of an mp4; empty if an mp4 is.
         backends: Every way to draw, in the order of `get_args(Backend)`, the sketch last.
         renderer: The name of the one that will draw.
         window: Why `render_mode="human"` has no window; empty if it has one.
@@ -96,15 +95,10 @@ class Report:
     system: dict[str, str]
     versions: dict[str, str | None]
     environment: dict[str, str]
-    ffmpegs: tuple[FFmpeg, ...]
+    no_mp4: str
     backends: tuple[BackendReport, ...]
     renderer: str
     window: str
-
-    @property
-    def ffmpeg(self) -> FFmpeg | None:
-        """The one that will write mp4; None if a gif will be written instead."""
-        return next((found for found in self.ffmpegs if found.codec), None)
 
     def as_dict(self) -> dict[str, Any]:
         """The same as plain data, for JSON."""
@@ -125,7 +119,7 @@ def examine() -> Report:
         system=_system(),
         versions={name: version_of(name) for name in PACKAGES},
         environment={name: _variable(name) for name in VARIABLES if name in os.environ},
-        ffmpegs=tuple(map(encoders.examine, encoders.SOURCES)),
+        no_mp4=why_no_mp4(),
         backends=(*reports, _report_sketch(chosen)),
         renderer=chosen or "sketch",
         window=trials["glfw"].reason,
@@ -215,7 +209,6 @@ def _lines(report: Report) -> Iterator[str]:
     yield f"  → frames are drawn by {report.renderer}; {_window(report)}"
     yield ""
     yield "encoding"
-    yield from _table((one.source, _ability(one)) for one in report.ffmpegs)
     yield f"  → {_encoding(report)}"
 
 
@@ -236,18 +229,7 @@ def _window(report: Report) -> str:
     )
 
 
-def _ability(one: FFmpeg) -> str:
-    if one.reason:
-        return one.reason
-    return f"ffmpeg {one.version} with {one.codec} ({one.program})"
-
-
 def _encoding(report: Report) -> str:
-    if report.ffmpeg is not None:
-        return f"mp4 by the ffmpeg of {report.ffmpeg.source}; gif, webp and png by Pillow"
-    family = _linux_family()
-    hint = ""
-    if family in _INSTALL:
-        command, packages = _INSTALL[family]
-        hint = f"; for mp4: {command} {packages['ffmpeg']}"
-    return f"no H.264 encoder: a gif is written instead of an mp4{hint}"
+    if report.no_mp4:
+        return f"a gif is written instead of an mp4: {report.no_mp4}; python -m pip install av"
+    return f"mp4 by PyAV's {CODEC}; gif, webp and png by Pillow"

@@ -17,20 +17,22 @@ from mjcartpole.leftovers import name_aside, temporary_beside
 _NUMBERED: Final = re.compile(r"\d{6,}\.png")
 
 
-def write_pictures(folder: Path, frames: Iterator[npt.NDArray[np.uint8]]) -> int:
+def write_pictures(folder: Path, frames: Iterator[npt.NDArray[np.uint8]], fps: float) -> int:
     """Write frames as 000000.png, 000001.png, … into a folder; returns their number.
 
     Args:
         folder: An existing folder.
         frames: Pictures of shape (height, width, 3).
+        fps: Frames per second, which pictures do not tell.
     """
-    # Imported late: most videos need no Pillow.
-    from PIL import Image  # noqa: PLC0415
+    # Imported late: most videos need no single pictures.
+    from imageio import v3 as imageio  # noqa: PLC0415
 
     count = 0
     for frame in frames:
         # Little compression: each further level costs more time than it saves bytes.
-        Image.fromarray(frame).save(folder / f"{count:06d}.png", compress_level=1)
+        picture = imageio.imwrite("<bytes>", frame, extension=".png", compress_level=1)
+        (folder / f"{count:06d}.png").write_bytes(picture)
         count += 1
     return count
 

@@ -19,12 +19,14 @@ import numpy.typing as npt
 
 from mjcartpole.errors import RenderError
 from mjcartpole.files import atomic_write
-from mjcartpole.media.encoders import FFmpeg, find_ffmpeg, why_not_the_first
-from mjcartpole.media.h264 import even, write_mp4
+from mjcartpole.media.mp4 import even, why_no_mp4, write_mp4
 from mjcartpole.media.pictures import check_folder, replacing_folder, write_pictures
 
 Frame = npt.NDArray[np.uint8]
 """A picture of shape (height, width, 3): red, green, blue."""
+
+Writer = Callable[[Path, Iterator[Frame], float], int]
+"""Writes frames, so many per second, into a file or folder; returns their number."""
 
 FORMATS: Final = (".mp4", ".gif", ".webp")
 """What `write_video` writes, by the file's suffix; a path without one is a folder of png."""
@@ -32,6 +34,7 @@ FORMATS: Final = (".mp4", ".gif", ".webp")
 DEFAULT_FPS: Final = 50
 """Frames per second of real time, since a control step takes 0.02 s."""
 
+_LEAST_FPS: Final = 0.01
 _MOST_FPS: Final = 1000
 _ENDING: Final = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
 _FRAMES_AHEAD: Final = 4
@@ -79,17 +82,17 @@ def write_video(
         FileError: The file cannot be written, or a folder holds other things than pictures.
     """
     suffix = check_path(path)
-    if not 0 < fps <= _MOST_FPS:
+    if not _LEAST_FPS <= fps <= _MOST_FPS:
         raise RenderError(
-            f"fps {fps!r} makes no sense; use a number of frames per second up to {_MOST_FPS}"
+            f"fps {fps!r} makes no sense; use {_LEAST_FPS} to {_MOST_FPS} frames per second"
         )
     target = Path(path)
-    ffmpeg = _find_ffmpeg(target) if suffix == ".mp4" else None
-    if suffix == ".mp4" and ffmpeg is None:
+    if suffix == ".mp4" and (why := why_no_mp4()):
         suffix, target = ".gif", target.with_suffix(".gif")
+        _log.warning("no mp4 (%s); writing '%s' instead", why, target)
     with _cleaned_up_by_signals():
         first, stream = _peek(frames)
-        return _write(target, suffix, _checked(stream, first.shape), first, fps, ffmpeg)
+        return _write(target, suffix, _checked(stream, first.shape), first.shape[1::-1], fps)
 
 
 def check_path(path: str | os.PathLike[str]) -> str:
@@ -112,42 +115,31 @@ def check_path(path: str | os.PathLike[str]) -> str:
 
 
 def _write(
-    target: Path,
-    suffix: str,
-    frames: Iterator[Frame],
-    first: Frame,
-    fps: float,
-    ffmpeg: FFmpeg | None,
+    target: Path, suffix: str, frames: Iterator[Frame], size: tuple[int, int], fps: float
 ) -> Video:
-    height, width = first.shape[:2]
-    if ffmpeg is not None:
-        size = _size_for_h264(width, height)
-        with atomic_write(target) as temporary:
-            count = write_mp4(temporary, frames, (width, height), fps, ffmpeg)
-        return Video(target, count, *size, fps)
     if not suffix:
         with replacing_folder(target) as folder:
-            count = _in_background(lambda stream: write_pictures(folder, stream), frames)
-        return Video(target, count, width, height, fps)
+            count = _in_background(write_pictures, folder, frames, fps)
+        return Video(target, count, *size, fps)
+    write, most = _writer(suffix)
+    if suffix == ".mp4":
+        size = _size_for_h264(*size)
+    shown = _shown_fps(fps, most, suffix)
+    with atomic_write(target) as temporary:
+        count = _in_background(write, temporary, frames, fps)
+    return Video(target, count, *size, shown)
+
+
+def _writer(suffix: str) -> tuple[Writer, float]:
+    """Return who writes a format, and how many frames per second it shows at most."""
+    if suffix == ".mp4":
+        return write_mp4, _MOST_FPS
     # Imported late: an mp4 needs no Pillow.
     from mjcartpole.media import animation  # noqa: PLC0415
 
-    gif = suffix == ".gif"
-    write = animation.write_gif if gif else animation.write_webp
-    shown = _shown_fps(fps, animation.GIF_MOST_FPS if gif else animation.WEBP_MOST_FPS, suffix)
-    with atomic_write(target) as temporary:
-        count = _in_background(lambda stream: write(temporary, stream, fps), frames)
-    return Video(target, count, width, height, shown)
-
-
-def _find_ffmpeg(target: Path) -> FFmpeg | None:
-    """Who encodes an mp4; a line in the log if that is not who was to be expected."""
-    ffmpeg, why = find_ffmpeg(), why_not_the_first()
-    if ffmpeg is None:
-        _log.warning("no mp4 (%s); writing '%s' instead", why, target.with_suffix(".gif"))
-    elif why:
-        _log.warning("%s; using '%s'", why, ffmpeg.program)
-    return ffmpeg
+    if suffix == ".gif":
+        return animation.write_gif, animation.GIF_MOST_FPS
+    return animation.write_webp, animation.WEBP_MOST_FPS
 
 
 def _size_for_h264(width: int, height: int) -> tuple[int, int]:
@@ -161,7 +153,7 @@ def _size_for_h264(width: int, height: int) -> tuple[int, int]:
     return size
 
 
-def _shown_fps(fps: float, most: int, suffix: str) -> float:
+def _shown_fps(fps: float, most: float, suffix: str) -> float:
     if fps > most:
         _log.warning("%s shows at most %d frames per second: %g is thinned out", suffix, most, fps)
     return min(fps, most)
@@ -199,11 +191,11 @@ class _StoppedError(Exception):
     """The frames have ended early."""
 
 
-def _in_background(write: Callable[[Iterator[Frame]], int], frames: Iterator[Frame]) -> int:
+def _in_background(write: Writer, path: Path, frames: Iterator[Frame], fps: float) -> int:
     """Encode in a thread, while this one draws the next frame (OpenGL may need this one)."""
     waiting: queue.Queue[Frame | _StoppedError | None] = queue.Queue(_FRAMES_AHEAD)
     with ThreadPoolExecutor(1, "mjcartpole-video") as executor:
-        writing = executor.submit(write, _taken(waiting))
+        writing = executor.submit(write, path, _taken(waiting), fps)
         end: _StoppedError | None = _StoppedError()
         try:
             for frame in frames:
