@@ -1,6 +1,7 @@
 """H.264 by PyAV: failures, and what stands in where it cannot be written."""
 
 import os
+import random
 import subprocess
 import sys
 import textwrap
@@ -76,3 +77,16 @@ def test_no_thread_outlives_a_film(tmp_path):
     command = [sys.executable, "-c", textwrap.dedent(code), str(tmp_path / "run.mp4")]
     done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True)
     assert done.stdout == "0\n"
+
+
+def test_the_same_frames_are_the_same_bytes_whatever_memory_held_before(tmp_path):
+    bar = np.tile(np.array([220, 240, 250], np.uint8), (20, 48, 64, 1))
+    for index, frame in enumerate(bar):
+        frame[:, index : index + 8] = (200, 90, 40)
+    noise, films = random.Random(0), set()
+    for _ in range(30):
+        # Freed at once: the encoder gets it.
+        [noise.randbytes(noise.randrange(200, 120_000)) for _ in range(60)]
+        write_video(tmp_path / "run.mp4", bar)
+        films.add((tmp_path / "run.mp4").read_bytes())
+    assert len(films) == 1
