@@ -4,18 +4,18 @@ import sys
 from pathlib import Path
 
 from mjcartpole.commands.options import EvalTarget
-from mjcartpole.envs.backend import Backend, check_backend
+from mjcartpole.envs.backend import check_backend
 from mjcartpole.errors import ConfigError, RunError
 from mjcartpole.files import is_file
-from mjcartpole.integrator import Integrator
 from mjcartpole.learning import runs
+from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.documents import read_summary
 from mjcartpole.learning.policy import Policy
 from mjcartpole.physics.load import ModelLike, load_model
 from mjcartpole.physics.simulation import silence_mujoco
 from mjcartpole.studies import evaluation, multi_seed_runs
 from mjcartpole.studies.film import PolicySetup
-from mjcartpole.task import CARTPOLE_V1, task_named
+from mjcartpole.task import task_named
 
 
 def set_up(source: Path, target: EvalTarget) -> PolicySetup:
@@ -27,36 +27,35 @@ def set_up(source: Path, target: EvalTarget) -> PolicySetup:
     silence_mujoco()
     seed = evaluation.SEED if target.seed is None else target.seed
     evaluation.check_count(1, seed)
-    backend: Backend
-    integrator: Integrator
-    run: runs.Run | None = None
-    if is_file(source):
-        # Every run's own is called policy.json: its folder tells them apart.
-        name = _run_name(source.parent) if source.name == runs.POLICY else source.stem
-        policy = Policy.load(source)
-        backend, integrator, model, own_timestep = "mujoco", "gym", "cartpole", False
-        task = CARTPOLE_V1.name
-        if target.allow_assets:
-            raise ConfigError("--allow-assets is for the model of a run; a policy's file has none")
-    else:
-        run = runs.load_run(source)
-        name, policy = _run_name(run.folder), run.policy
-        backend, integrator = run.config.backend, run.config.integrator
-        model, own_timestep, task = str(run.model), run.config.own_timestep, run.config.task
-    backend = target.backend or backend
+    name, policy, config, run = _read(source, target)
+    backend = target.backend or config.backend
+    own_model = str(run.model) if run else config.model
     if backend == "gym":
         # Gymnasium's cart-pole has neither; only what the user asks for is held against that.
-        integrator, model, own_timestep = "gym", "cartpole", False
-    model, integrator = target.model or model, target.integrator or integrator
+        config, own_model = TrainConfig(backend="gym", task=config.task), "cartpole"
+    model, integrator = target.model or own_model, target.integrator or config.integrator
     check_backend(backend, model, integrator, target.set, own_timestep=target.own_timestep)
-    own_timestep = own_timestep or target.own_timestep
+    own_timestep = config.own_timestep or target.own_timestep
     played_on: ModelLike = model
     if run is not None and model == str(run.model):
         played_on = run.cartpole(target.allow_assets, own_timestep=own_timestep)
     if target.set or (own_timestep and played_on == model):
         played_on = load_model(played_on, target.set, own_timestep=own_timestep)
-    rules = task_named(target.task or task)
+    rules = task_named(target.task or config.task)
     return PolicySetup(name, policy, backend, played_on, integrator, seed, rules)
+
+
+def _read(source: Path, target: EvalTarget) -> tuple[str, Policy, TrainConfig, runs.Run | None]:
+    """Return a policy, its name, how it was trained, as far as that is known, and its run."""
+    if not is_file(source):
+        run = runs.load_run(source)
+        return _run_name(run.folder), run.policy, run.config, run
+    # Every run's own is called policy.json: its folder tells them apart.
+    name = _run_name(source.parent) if source.name == runs.POLICY else source.stem
+    policy = Policy.load(source)
+    if target.allow_assets:
+        raise ConfigError("--allow-assets is for the model of a run; a policy's file has none")
+    return name, policy, TrainConfig(), None
 
 
 def _run_name(folder: Path) -> str:
