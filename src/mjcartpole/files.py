@@ -13,9 +13,6 @@ from typing import Final
 from mjcartpole.errors import FileError
 from mjcartpole.leftovers import temporary_beside
 
-_NO_WAITING: Final = getattr(os, "O_NONBLOCK", 0)
-_NO_LINK: Final = getattr(os, "O_NOFOLLOW", 0)
-
 _TEMPORARY = re.compile(r"\.[\w.-]+-[0-9a-f]{8}(\.\w+)?")
 """What `temporary_beside` calls them."""
 
@@ -72,7 +69,7 @@ def opened(
     Raises:
         FileError: It cannot be read, is no regular file, or too large.
     """
-    extra = _NO_WAITING | (0 if follow else _NO_LINK)
+    extra = getattr(os, "O_NONBLOCK", 0) | (0 if follow else getattr(os, "O_NOFOLLOW", 0))
     try:
         _check_regular(Path(path).stat(follow_symlinks=follow), most)
         with open(path, "rb", opener=lambda name, flags: os.open(name, flags | extra)) as file:
@@ -89,7 +86,7 @@ def read_bytes(
     follow: bool = False,
     refusal: type[FileError] = FileError,
 ) -> bytes:
-    """The content of a file; see `opened`.
+    """Return the content of a file; see `opened`.
 
     Raises:
         FileError: See `opened`.
@@ -108,24 +105,23 @@ def _check_regular(found: os.stat_result, most: int) -> None:
 
 
 def brief(error: Exception) -> str:
-    """What an error says, in one line of bounded length."""
+    """Return what an error says, in one line of bounded length."""
     message = error.strerror if isinstance(error, OSError) else None
     words = " ".join((message or str(error)[:1_000]).split())
     return words if len(words) <= _LONGEST else f"{words[:_LONGEST]}…"
 
 
 def names_in(folder: Path) -> set[str]:
-    """Names of what lies in a folder; none where there is no folder.
+    """Return names of what lies in a folder; none where there is no folder.
 
     Raises:
         FileError: It cannot be read.
     """
-    try:
-        return {path.name for path in folder.iterdir()}
-    except (FileNotFoundError, NotADirectoryError):
-        return set()
-    except OSError as error:
-        raise FileError(f"cannot read the folder '{folder}': {brief(error)}") from error
+    with _refused(f"cannot read the folder '{folder}'"):
+        try:
+            return {path.name for path in folder.iterdir()}
+        except (FileNotFoundError, NotADirectoryError):
+            return set()
 
 
 def remove(path: Path) -> None:
@@ -134,10 +130,8 @@ def remove(path: Path) -> None:
     Raises:
         FileError: It cannot be removed, or is a folder.
     """
-    try:
+    with _refused(f"cannot remove '{path}'"):
         path.unlink(missing_ok=True)
-    except OSError as error:
-        raise FileError(f"cannot remove '{path}': {brief(error)}") from error
 
 
 def is_there(path: Path) -> bool:
@@ -146,12 +140,12 @@ def is_there(path: Path) -> bool:
 
 
 def is_file(path: Path) -> bool:
-    """Whether a regular file, or a link to one, can be seen there."""
+    """Return whether a regular file, or a link to one, can be seen there."""
     return stat.S_ISREG(_mode(path, follow=True))
 
 
 def is_folder(path: Path, *, follow: bool = True) -> bool:
-    """Whether a folder, or a link to one, can be seen there."""
+    """Return whether a folder, or a link to one, can be seen there."""
     return stat.S_ISDIR(_mode(path, follow=follow))
 
 
@@ -170,10 +164,8 @@ def make_folder(path: str | os.PathLike[str]) -> Path:
         FileError: It cannot be made, or a file is in the way.
     """
     folder = Path(path)
-    try:
+    with _refused(f"cannot make the folder '{folder}'"):
         folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise FileError(f"cannot make the folder '{folder}': {brief(error)}") from error
     return folder
 
 
@@ -199,7 +191,7 @@ def check_free(paths: Sequence[Path]) -> None:
 
 
 def free_path(path: Path, suffixes: Sequence[str] = ()) -> Path:
-    """The first of `a.mp4`, `a-2.mp4`, `a-3.mp4` … that is not there.
+    """Return the first of `a.mp4`, `a-2.mp4`, `a-3.mp4` … that is not there.
 
     Args:
         path: The first.
@@ -220,7 +212,7 @@ def remove_leftovers(folder: Path) -> None:
 
 
 def is_temporary(name: str) -> bool:
-    """Whether a file's name is one that only a writer here gives, until its file is whole."""
+    """Return whether a name is one that only a writer here gives, until its file is whole."""
     return _TEMPORARY.fullmatch(name) is not None
 
 
@@ -229,14 +221,20 @@ def _temporary(target: Path) -> Iterator[Path]:
     make_folder(target.parent)
     if is_folder(target):
         raise FileError(f"cannot write '{target}': it is a folder; give the path of a file")
+    make = functools.partial(Path.touch, exist_ok=False)
+    with _refused(f"cannot write '{target}'"), temporary_beside(target, make) as temporary:
+        try:
+            yield temporary
+        finally:
+            temporary.unlink(missing_ok=True)
+
+
+@contextlib.contextmanager
+def _refused(what: str) -> Iterator[None]:
     try:
-        with temporary_beside(target, functools.partial(Path.touch, exist_ok=False)) as temporary:
-            try:
-                yield temporary
-            finally:
-                temporary.unlink(missing_ok=True)
+        yield
     except OSError as error:
-        raise FileError(f"cannot write '{target}': {brief(error)}") from error
+        raise FileError(f"{what}: {brief(error)}") from error
 
 
 def sync(path: Path) -> None:

@@ -45,7 +45,7 @@ def temporary_beside(target: Path, make: Callable[[Path], None]) -> Iterator[Pat
 
 
 def name_aside(temporary: Path, target: Path) -> Path:
-    """Where a folder is put for the moment in which a temporary one takes its place."""
+    """Return where a folder is put for the moment in which a temporary one takes its place."""
     return temporary.with_name(f"{temporary.stem}.old-{target.name}")
 
 

@@ -48,14 +48,14 @@ def patient_output() -> Iterator[None]:
 
 
 def stdout_problem() -> OSError | None:
-    """What became of the first words that could not be written; None if all were taken."""
+    """Return what became of the first words that could not be written; None if all were taken."""
     sys.stdout.flush()
     buffer = getattr(sys.stdout, "buffer", None)
     return getattr(getattr(buffer, "raw", buffer), "problem", None)
 
 
 def has_left(problem: OSError) -> bool:
-    """Whether a reader wants no more (`… | head`), which is nobody's mistake."""
+    """Return whether a reader wants no more (`… | head`), which is nobody's mistake."""
     # Windows calls a pipe that nobody reads an invalid argument.
     return isinstance(problem, ConnectionError) or problem.errno == errno.EINVAL
 

@@ -35,7 +35,7 @@ class StopSignals:
         self._deferred = False
 
     def stop(self) -> bool:
-        """Whether a signal has come."""
+        """Return whether a signal has come."""
         return self.number != 0
 
     @contextlib.contextmanager

@@ -20,7 +20,6 @@ from mjcartpole.physics.structure import (
     count_from_upright,
     find_controls,
     find_joints,
-    find_substeps,
     refusal,
 )
 
@@ -28,13 +27,12 @@ _NAMES_FILE: Final = re.compile(r"file\w*\s*=")
 """In the text of a document that depends on other files: includes, meshes, attached models."""
 
 
-def build(text: str, name: str, own_timestep: bool, path: Path | None = None) -> CartPole:
+def build(text: str, name: str, path: Path | None = None) -> CartPole:
     """Return the cart-pole that a document describes; shared by all, so nobody may change it.
 
     Args:
         text: The document as it was written.
         name: What a person calls it.
-        own_timestep: Whether a control step is one physics step of the document's.
         path: The file that it was read from; None where there is none.
 
     Raises:
@@ -43,11 +41,11 @@ def build(text: str, name: str, own_timestep: bool, path: Path | None = None) ->
     folder, called = (path.parent, str(path)) if path else (Path(), name)
 
     def make() -> CartPole:
-        return find_parts(name, *compile_text(text, called, folder), own_timestep)
+        return find_parts(name, *compile_text(text, called, folder))
 
     if _NAMES_FILE.search(text):
         return make()
-    return dataclasses.replace(remembered((text, own_timestep), make), name=name)
+    return dataclasses.replace(remembered(text, make), name=name)
 
 
 def compile_text(
@@ -62,8 +60,8 @@ def compile_text(
     return document.text, compile_document(document, name)
 
 
-def find_parts(name: str, xml: str, model: mujoco.MjModel, own_timestep: bool) -> CartPole:
-    """Return a compiled model as a cart-pole.
+def find_parts(name: str, xml: str, model: mujoco.MjModel) -> CartPole:
+    """Return a compiled model as a cart-pole, whose control step is one physics step.
 
     Raises:
         ModelError: It is none, or no simulation survives its numbers.
@@ -72,8 +70,7 @@ def find_parts(name: str, xml: str, model: mujoco.MjModel, own_timestep: bool) -
     try:
         slider, hinges = find_joints(model)
         controls = find_controls(model, slider)
-        substeps = 1 if own_timestep else find_substeps(name, model)
-        found = CartPole(name, xml, model, slider, hinges, controls, substeps, ())
+        found = CartPole(name, xml, model, slider, hinges, controls, 1, ())
         # From the cart outwards: which way a pole on a pole stands depends on the one below it.
         upright = tuple(count_from_upright(found, pole) for pole in range(found.poles))
         check_limits(found)

@@ -15,18 +15,23 @@ from typing import Final, TypeAlias
 import mujoco
 import numpy as np
 
-from mjcartpole.errors import ConfigError, ModelNotFoundError, ModelSyntaxError
+from mjcartpole.errors import ConfigError, ModelNotFoundError, ModelSyntaxError, NotACartPoleError
 from mjcartpole.physics.build import build, compile_text, find_parts
 from mjcartpole.physics.cartpole import CartPole, own_copy
 from mjcartpole.physics.edit.edits import edit_document, edits_of
 from mjcartpole.physics.includes import read_text, read_whole
 from mjcartpole.physics.library import all_digits, one_line
+from mjcartpole.task import CONTROL_STEP
 
 ModelLike: TypeAlias = str | os.PathLike[str] | mujoco.MjSpec | CartPole
 """What `load_model` takes: a name, a path, an XML document, an MjSpec, or a loaded cart-pole."""
 
 Edits: TypeAlias = Mapping[str, object] | Sequence[str] | None
 """Changes of a document: a mapping, or texts such as "pole.length=1.5"."""
+
+
+MOST_SUBSTEPS: Final = 1_000
+"""Physics steps per control step."""
 
 
 @functools.cache
@@ -76,24 +81,29 @@ def load_shared(
     source: ModelLike = "cartpole", edits: Edits = None, *, own_timestep: bool = False
 ) -> CartPole:
     """Load as `load_model`, for those who only read: a compiled document is shared by all."""
-    if edits:
-        return _load_edited(source, edits, own_timestep)
+    if isinstance(source, CartPole) and not (edits or own_timestep):
+        return source
+    found = _load(source)
+    # An edit may be what makes a file's timestep fit.
+    return paced(_edited(source, found, edits) if edits else found, own_timestep)
+
+
+def _load(source: ModelLike) -> CartPole:
+    """Return a model as it is written, whose control step is one physics step."""
     if isinstance(source, CartPole):
-        return dataclasses.replace(source, substeps=1) if own_timestep else source
+        return dataclasses.replace(source, substeps=1)
     if isinstance(source, mujoco.MjSpec):
-        return find_parts(*_from_spec(source), own_timestep)
+        return find_parts(*_from_spec(source))
     if isinstance(source, str) and source.lstrip().startswith("<"):
-        return build(source, "the XML document", own_timestep)
+        return build(source, "the XML document")
     path = find_model(source)
     name = path.stem if path.parent == models_folder() else str(source)
-    return build(read_text(path), name, own_timestep, path)
+    return build(read_text(path), name, path)
 
 
-def _load_edited(
-    source: ModelLike, edits: Mapping[str, object] | Sequence[str], own_timestep: bool
+def _edited(
+    source: ModelLike, base: CartPole, edits: Mapping[str, object] | Sequence[str]
 ) -> CartPole:
-    # An edit may be what makes a file's timestep fit.
-    base = load_shared(source, own_timestep=True)
     if isinstance(source, CartPole | mujoco.MjSpec) and not is_its_document(base):
         raise ConfigError(
             f"{base.name} cannot be edited: its document compiles to another model, since its "
@@ -103,13 +113,36 @@ def _load_edited(
     changes = edits_of(edits)
     document = edit_document(base.xml, changes, base.name)
     what = ", ".join(f"{key}={value}" for key, value in changes.items())
-    return build(document, f"{base.name} with {what}", own_timestep)
+    return build(document, f"{base.name} with {what}")
+
+
+def paced(cartpole: CartPole, own_timestep: bool) -> CartPole:
+    """Return a cart-pole with as many physics steps as fill a control step of 0.02 s.
+
+    Raises:
+        NotACartPoleError: The timestep does not divide it, or there would be too many.
+    """
+    if own_timestep:
+        return cartpole
+    timestep, name = cartpole.timestep, cartpole.name
+    substeps = round(CONTROL_STEP / timestep)
+    if substeps > MOST_SUBSTEPS:
+        raise NotACartPoleError(
+            f"{name}: timestep {timestep:g} s makes {substeps:g} physics steps of one control step "
+            f"of {CONTROL_STEP} s, and no more than {MOST_SUBSTEPS} are done; use 0.001 …"
+        )
+    if substeps < 1 or abs(substeps * timestep - CONTROL_STEP) > 1e-12:
+        raise NotACartPoleError(
+            f"{name}: timestep {timestep:g} s does not divide the control step of "
+            f"{CONTROL_STEP} s; use 0.02, 0.01, 0.005, 0.002 …, or take the file's own as the "
+            "control step (--own-timestep, own_timestep=True)"
+        )
+    return cartpole if substeps == 1 else dataclasses.replace(cartpole, substeps=substeps)
 
 
 def is_its_document(cartpole: CartPole) -> bool:
     """Return whether the document compiles to the very model that runs."""
-    again = build(cartpole.xml, cartpole.name, own_timestep=True)
-    return same_model(again.model, cartpole.model)
+    return same_model(build(cartpole.xml, cartpole.name).model, cartpole.model)
 
 
 def load_named(document: str, name: str, *, own_timestep: bool = True) -> CartPole:
@@ -118,7 +151,7 @@ def load_named(document: str, name: str, *, own_timestep: bool = True) -> CartPo
     Raises:
         ModelError: It does not load, or is no cart-pole.
     """
-    return own_copy(build(document, name, own_timestep))
+    return own_copy(paced(build(document, name), own_timestep))
 
 
 def load_stored(
@@ -145,7 +178,7 @@ def load_stored(
         if not allowed.is_dir():
             raise ConfigError(f"'{allowed}' is no folder; give one in which the model's files lie")
     inside = (folder, *allow_assets)
-    return find_parts(name, *compile_text(document, name, folder, inside), own_timestep)
+    return paced(find_parts(name, *compile_text(document, name, folder, inside)), own_timestep)
 
 
 def find_model(source: str | os.PathLike[str]) -> Path:

@@ -17,9 +17,6 @@ from mjcartpole.errors import NotACartPoleError
 from mjcartpole.physics.bodies import data_at_zero, mass_of, pole_bodies, subtree
 from mjcartpole.physics.cartpole import CartPole, Vector, motor_of
 
-MOST_SUBSTEPS: Final = 1_000
-"""Physics steps per control step."""
-
 LEAST_COUPLING: Final = 0.5
 """How much of a push along the rail must act in the plane in which the pole turns."""
 
@@ -174,28 +171,6 @@ def is_servo(model: mujoco.MjModel) -> bool:
     motor = motor_of(model)
     biased = model.actuator_biastype[motor] != mujoco.mjtBias.mjBIAS_NONE
     return bool(biased and model.actuator_biasprm[motor, 1:3].any())
-
-
-def find_substeps(name: str, model: mujoco.MjModel) -> int:
-    """Return physics steps that fill a control step of 0.02 s.
-
-    Raises:
-        NotACartPoleError: The timestep does not divide it, or there would be too many.
-    """
-    timestep, step = float(model.opt.timestep), task.CONTROL_STEP
-    substeps = round(step / timestep)
-    if substeps > MOST_SUBSTEPS:
-        raise NotACartPoleError(
-            f"{name}: timestep {timestep:g} s makes {substeps:g} physics steps of one control step "
-            f"of {step} s, and no more than {MOST_SUBSTEPS} are done; use 0.001 …"
-        )
-    if substeps < 1 or abs(substeps * timestep - step) > 1e-12:
-        raise NotACartPoleError(
-            f"{name}: timestep {timestep:g} s does not divide the control step of {step} s; "
-            "use 0.02, 0.01, 0.005, 0.002 …, or take the file's own as the control step "
-            "(--own-timestep, own_timestep=True)"
-        )
-    return substeps
 
 
 def directions(cartpole: CartPole, pole: int = 0) -> Directions:

@@ -112,7 +112,7 @@ def apply_meanings(document: Document, values: Mapping[str, float], name: str) -
         ConfigError: The document leaves no room for an edit; the reason is said.
         ModelError: The document is no cart-pole, or is none afterwards.
     """
-    cartpole = build(document.text, name, own_timestep=True)
+    cartpole = build(document.text, name)
     whole, by_pole = _sort_by_pole(values, cartpole.poles)
     _edit_options(document, cartpole.model, whole)
     parts = Parts(document, cartpole)
@@ -123,7 +123,7 @@ def apply_meanings(document: Document, values: Mapping[str, float], name: str) -
         set_mass(parts, cart_bodies(cartpole), "cart", whole["cart.mass"])
     centres = [_edit_pole(document, cartpole, pole, wanted) for pole, wanted in enumerate(by_pole)]
     name += f" with {', '.join(f'{key}={value:g}' for key, value in values.items())}"
-    after = build(document.text, name, own_timestep=True)
+    after = build(document.text, name)
     _check_outcome(_found(after), whole)
     for pole, wanted in enumerate(by_pole):
         _check_outcome(_found_of_pole(after, pole), wanted)
@@ -167,7 +167,7 @@ def _edit_pole(
     if "pole.length" in values:
         longer = set_length(Parts(document, before), values["pole.length"], pole)
     if "pole.length" in values or "pole.mass" in values:
-        stretched = build(document.text, before.name, own_timestep=True)
+        stretched = build(document.text, before.name)
         set_pole_mass(Parts(document, stretched), values.get("pole.mass", wanted.mass), pole)
     return longer * wanted.com
 
