@@ -58,16 +58,12 @@ def opened(
     follow: bool = False,
     refusal: type[FileError] = FileError,
 ) -> Iterator[BufferedReader]:
-    """Open a regular file to be read; what is none is not even opened.
+    """Open a regular file of so many bytes at most; what is none is not even opened.
 
-    Args:
-        path: Where it is.
-        most: Bytes that it may have.
-        follow: Take a link for what it leads to, as where a person names it.
-        refusal: What is raised.
+    A link is refused unless `follow` takes it for what it leads to, as where a person names it.
 
     Raises:
-        FileError: It cannot be read, is no regular file, or too large.
+        FileError: It cannot be read, is no regular file, or too large; of the type `refusal`.
     """
     extra = getattr(os, "O_NONBLOCK", 0) | (0 if follow else getattr(os, "O_NOFOLLOW", 0))
     try:
@@ -191,11 +187,9 @@ def check_free(paths: Sequence[Path]) -> None:
 
 
 def free_path(path: Path, suffixes: Sequence[str] = ()) -> Path:
-    """Return the first of `a.mp4`, `a-2.mp4`, `a-3.mp4` … that is not there.
+    """Return the first of `a.mp4`, `a-2.mp4`, `a-3.mp4` … of which nothing is there.
 
-    Args:
-        path: The first.
-        suffixes: What belongs to it: none of these is there beside it either.
+    What belongs to it, with other suffixes, is not there beside it either.
     """
     stem, free, number = path.with_suffix(""), path, 1
     while any(os.path.lexists(free.with_suffix(suffix)) for suffix in (path.suffix, *suffixes)):

@@ -24,11 +24,7 @@ def temporary_beside(target: Path, make: Callable[[Path], None]) -> Iterator[Pat
     """Yield a temporary file or folder that is nobody else's; the caller removes it in the end.
 
     Its name keeps the target's suffix, since encoders choose the format by it. What killed writers
-    have left in that folder goes.
-
-    Args:
-        target: Whose place it is to take.
-        make: Makes it; raises FileExistsError if it is there.
+    have left in that folder goes. `make` makes it, and raises FileExistsError if it is there.
 
     Raises:
         OSError: It cannot be made.

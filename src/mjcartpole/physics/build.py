@@ -30,10 +30,7 @@ _NAMES_FILE: Final = re.compile(r"file\w*\s*=")
 def build(text: str, name: str, path: Path | None = None) -> CartPole:
     """Return the cart-pole that a document describes; shared by all, so nobody may change it.
 
-    Args:
-        text: The document as it was written.
-        name: What a person calls it.
-        path: The file that it was read from; None where there is none.
+    `name` is what a person calls it, `path` the file that it was read from, if there is one.
 
     Raises:
         ModelError: It does not load, or is no cart-pole.

@@ -109,15 +109,10 @@ def own_copy(cartpole: CartPole) -> CartPole:
 def with_options(
     cartpole: CartPole, *, timestep: float | None = None, integrator: str | None = None
 ) -> CartPole:
-    """Return a cart-pole with other options, one physics step per control step.
+    """Return a cart-pole with another timestep (s) or integrator, one step per control step.
 
     For studies of integrators; the document stays as it was. Options are no geometry: changing
-    them in a compiled model leaves no derived value stale.
-
-    Args:
-        cartpole: The cart-pole.
-        timestep: Seconds.
-        integrator: As MJCF spells it (see `INTEGRATORS`).
+    them in a compiled model leaves no derived value stale. Integrators are spelled as in MJCF.
     """
     changed = dataclasses.replace(own_copy(cartpole), substeps=1)
     if timestep is not None:

@@ -23,12 +23,7 @@ def cartpole_v1_step(
 ) -> tuple[float, float, float, float]:
     """Return the state 0.02 s later, as gymnasium's `CartPoleEnv` computes it by explicit Euler.
 
-    Args:
-        x: m.
-        x_dot: m/s.
-        theta: rad.
-        theta_dot: rad/s.
-        force: Push on the cart along +x, N.
+    In m, m/s, rad, rad/s; the force pushes the cart along +x, N.
     """
     cos, sin = np.cos(theta), np.sin(theta)
     temp = (force + _POLE_MASS_LENGTH * (theta_dot * theta_dot) * sin) / _TOTAL_MASS

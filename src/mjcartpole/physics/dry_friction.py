@@ -63,16 +63,10 @@ _MODES = (0, -1, 1)
 
 
 def friction_forces(frictions: Frictions, inertia: Inertia, velocities: Pair, smooth: Pair) -> Pair:
-    """Return dry friction of both joints.
+    """Return dry friction of slider and hinge, N and N m; None in `frictions` is none.
 
-    Args:
-        frictions: Of the slider and of the hinge; None without.
-        inertia: Of the slider, shared, of the hinge; all that follow broadcast with each other.
-        velocities: m/s, rad/s.
-        smooth: Accelerations without friction, m/s^2, rad/s^2.
-
-    Returns:
-        N and N m.
+    Velocities are in m/s and rad/s, `smooth` are the accelerations without friction, m/s^2 and
+    rad/s^2; all but the frictions broadcast with each other.
     """
     best: Pair = 0.0, 0.0
     least: Number = math.inf

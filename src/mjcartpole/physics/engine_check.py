@@ -34,15 +34,10 @@ _KINDS: Final = tuple(sorted({n for n in dir(mujoco.MjData) if n.startswith("qfr
 
 
 def unexplained_forces(cartpole: CartPole, p: Parameters, region: FreeRegion) -> dict[str, str]:
-    """Return kinds of forces that act on the two joints beyond the equations.
+    """Return kinds of forces that act on the joints of a model of one pole beyond the equations.
 
-    Args:
-        cartpole: A model of one pole.
-        p: Its parameters.
-        region: Where it moves freely; states are drawn there.
-
-    Returns:
-        A phrase for each kind: the name of MuJoCo's array, and where and how much.
+    States are drawn from the region in which it moves freely. The result has a phrase for each
+    kind, which is the name of MuJoCo's array: where and how much.
     """
     rng = np.random.default_rng(0)
     low, high = region.box(wide_box(region.task))

@@ -32,13 +32,9 @@ def method_of(cartpole: CartPole) -> str:
 
 
 def file_step(p: Parameters, state: npt.ArrayLike, force: npt.ArrayLike, method: str) -> Array:
-    """Return the state one physics step later, shape (..., 4).
+    """Return the state one physics step later by one of `METHODS`, shape (..., 4).
 
-    Args:
-        p: The cart-pole.
-        state: Before the step, shape (..., 4).
-        force: F, N, constant during the step; broadcasts against the state's leading shape.
-        method: One of `METHODS`.
+    The force is in N, constant during the step; it broadcasts against the state's leading shape.
     """
     if method == "RK4":
         return equations.rk4_step(p, state, force)

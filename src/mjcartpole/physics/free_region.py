@@ -94,9 +94,7 @@ class FreeRegion:
 def free_region(cartpole: CartPole, *, task: Task = CARTPOLE_V1) -> FreeRegion:
     """Return where a cart-pole of one pole moves freely, by its joints' limits and its geoms.
 
-    Args:
-        cartpole: The cart-pole.
-        task: Where contacts matter: within its limits, or `wide_box` where it has none.
+    Contacts matter within the task's limits, or `wide_box` where it has none.
     """
     region = _by_limits(cartpole, task)
     if region.blocked or _no_contacts(cartpole.model):

@@ -67,11 +67,8 @@ def read_whole(
 ) -> Document:
     """Return a document with its includes in their place and absolute names of its other files.
 
-    Args:
-        text: As it was written. Without includes and other files it stays so to the last character.
-        name: What a person calls it.
-        folder: Where its includes and other files are.
-        inside: Folders in which all of these must lie; None: anywhere.
+    Without includes and other files it stays as it was written, to the last character. All of
+    these must lie inside of some folders, or may lie anywhere if `inside` is None.
 
     Raises:
         ModelNotFoundError: A file that it includes or attaches cannot be read, or lies outside.
@@ -86,14 +83,9 @@ def read_whole(
 
 
 def portable(text: str) -> tuple[str, dict[str, Path | str]]:
-    """Return a document that names its files by their content, without any folder.
+    """Return a document that names its files by their content, without any folder, and these files.
 
-    Args:
-        text: As `read_whole` gives it.
-
-    Returns:
-        The document, and by name the files beside it: where each is, or its text if it is a
-        document itself.
+    They are given by name: where each is, or its text if it is a document itself.
 
     Raises:
         ModelError: A file cannot be read.

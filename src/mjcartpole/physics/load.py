@@ -164,12 +164,7 @@ def load_stored(
 ) -> CartPole:
     """Load a document that a run stores, which may have been made by somebody else.
 
-    Args:
-        document: The document.
-        name: What a person calls it.
-        folder: The run's folder; what the document names must lie in there.
-        allow_assets: Other folders in which it may lie.
-        own_timestep: See `load_model`.
+    What it names must lie in the run's folder or in those of `allow_assets`.
 
     Raises:
         ModelError: It does not load, is no cart-pole, or names a file elsewhere.

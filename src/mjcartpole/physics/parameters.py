@@ -165,13 +165,7 @@ def take(p: Parameters, other: Parameters, names: Iterable[str]) -> Parameters:
 def differences(p: Parameters, q: Parameters, rtol: float = 1e-12) -> list[str]:
     """Return what `p` has instead of what `q` has, such as "pole mass 0.1001 instead of 0.1".
 
-    Args:
-        p: What is.
-        q: What was wanted.
-        rtol: Values this close, relative to the larger one, count as equal.
-
-    Returns:
-        One phrase per value that differs, in the order of the fields.
+    One phrase per value that differs by more than `rtol`, relative to the larger one.
     """
     found = []
     for (label, a), (_, b) in zip(_values(p), _values(q), strict=True):

@@ -53,13 +53,7 @@ def why_unplayable(
 ) -> str | None:
     """Say in one line that no policy can balance a model, where that is proven, or hardly any.
 
-    Args:
-        cartpole: The model.
-        integrator: Who moves it.
-        task: What ends an episode, and where it starts.
-
-    Returns:
-        The line; None where a policy may well balance it, or nothing is proven.
+    None where a policy may well balance it, or nothing is proven.
     """
     search = _Search(Simulation(cartpole, integrator), task)
     starts = np.random.default_rng(0).uniform(

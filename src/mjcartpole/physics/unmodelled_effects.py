@@ -51,13 +51,6 @@ def beyond_equations(cartpole: CartPole, *, task: Task = CARTPOLE_V1) -> list[st
     reference angle of a spring without stiffness), is not listed, nor what is met only outside
     the limits that end an episode, as a joint's range and geoms that collide may be. Whether
     anything acts is seen in the engine's own forces; the names are those of the usual effects.
-
-    Args:
-        cartpole: The model.
-        task: What ends an episode.
-
-    Returns:
-        One phrase each; empty if the equations cover the model.
     """
     if cartpole.poles > 1:
         return [several_poles(cartpole)]
@@ -88,17 +81,10 @@ def beyond_step(
     *,
     task: Task = CARTPOLE_V1,
 ) -> list[str]:
-    """Say why one step of the file's own integrator is not that of a method of the equations.
+    """Say why one step of the file's own integrator is not that of one of `file_steps.METHODS`.
 
-    Args:
-        cartpole: The model.
-        method: One of `file_steps.METHODS`.
-        beyond: What `beyond_equations` names, where it has been asked already.
-        task: What ends an episode.
-
-    Returns:
-        One phrase; none where the steps are the same, as those of two methods are where little
-        turns or brakes.
+    One phrase each; none where the steps are the same, as those of two methods are where little
+    turns or brakes. `beyond` is what `beyond_equations` names, where it has been asked already.
     """
     named = f"integrator {method_of(cartpole)} instead of {method}"
     beyond = beyond_equations(cartpole, task=task) if beyond is None else beyond

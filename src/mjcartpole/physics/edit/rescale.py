@@ -158,12 +158,10 @@ def uniform_rod_inertia(mass: float, length: float) -> float:
 
 
 def set_length(parts: Parts, length: float, pole: int = 0) -> float:
-    """Give a pole another length, hinge to tip: everything on it moves along.
+    """Give a pole another length, hinge to tip, and return how many times longer it is than it was.
 
-    Bodies that are fixed to the pole, and poles that stand on it, keep their shape and move.
-
-    Returns:
-        How many times longer it is than it was.
+    Everything on it moves along. Bodies that are fixed to the pole, and poles that stand on it,
+    keep their shape and move.
 
     Raises:
         ConfigError: The pole cannot be stretched; the reason is said.

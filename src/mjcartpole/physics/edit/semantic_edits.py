@@ -101,12 +101,7 @@ def _with_number(name: str, number: object) -> str:
 
 
 def apply_meanings(document: Document, values: Mapping[str, float], name: str) -> None:
-    """Make edits by meaning in a document.
-
-    Args:
-        document: A cart-pole; it is changed.
-        values: Checked values by name.
-        name: What a person calls the document.
+    """Make edits by meaning, checked values by name, in the document of a cart-pole.
 
     Raises:
         ConfigError: The document leaves no room for an edit; the reason is said.
