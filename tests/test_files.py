@@ -15,6 +15,7 @@ from mjcartpole.files import (
     check_writable,
     free_path,
     is_temporary,
+    is_there,
     make_folder,
     read_bytes,
     remove_leftovers,
@@ -181,3 +182,10 @@ def test_what_is_no_file_is_not_even_opened(make, what, tmp_path):
 def test_a_link_that_a_person_names_is_followed_but_to_files_only():
     with pytest.raises(FileError, match="it is a device or a pipe where"):
         read_bytes("/dev/zero", 10**6, follow=True)
+
+
+def test_what_is_there(tmp_path):
+    (tmp_path / "broken").symlink_to(tmp_path / "nothing")
+    assert is_there(tmp_path)
+    for path in (tmp_path / "nothing", tmp_path / "broken", tmp_path / "no\0path"):
+        assert not is_there(path)

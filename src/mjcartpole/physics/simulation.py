@@ -184,10 +184,8 @@ def _explicit_euler(
     model: mujoco.MjModel, data: mujoco.MjData, cartpole: CartPole
 ) -> Callable[[float], State]:
     qpos, qvel, ctrl = _floats(data.qpos), _floats(data.qvel), _floats(data.ctrl)
-    slider, hinge, substeps = cartpole.slider, cartpole.hinges[0], cartpole.substeps
-    joints = cartpole.joints
-    h = float(model.opt.timestep)
-    mj_step = mujoco.mj_step
+    slider, hinge, joints = cartpole.slider, cartpole.hinges[0], cartpole.joints
+    h, mj_step = float(model.opt.timestep), mujoco.mj_step
 
     def step(control: float) -> State:
         ctrl[0] = control
@@ -213,14 +211,16 @@ def _explicit_euler(
         return _state_of(qpos, qvel, joints)
 
     # One pole is the usual case; written out, it takes half the time.
-    step_once = step if cartpole.poles == 1 else step_poles
+    return _repeated(step if cartpole.poles == 1 else step_poles, cartpole.substeps)
 
+
+def _repeated(step: Callable[[float], State], times: int) -> Callable[[float], State]:
     def several_steps(control: float) -> State:
-        for _ in range(substeps - 1):
-            step_once(control)
-        return step_once(control)
+        for _ in range(times - 1):
+            step(control)
+        return step(control)
 
-    return step_once if substeps == 1 else several_steps
+    return step if times == 1 else several_steps
 
 
 def _own_integrator(
