@@ -83,18 +83,18 @@ def _try(
     frictions: Frictions, modes: tuple[int, ...], inertia: Inertia, velocities: Pair, smooth: Pair
 ) -> tuple[Pair, Number]:
     """Return the forces if each joint grips or slides as said, and how much that contradicts."""
-    grips = [
-        1 / friction.softness if friction and not mode else 0.0
-        for friction, mode in zip(frictions, modes, strict=True)
+    pairs = list(zip(frictions, modes, strict=True))
+    grips = [1 / friction.softness if friction and not mode else 0.0 for friction, mode in pairs]
+    slides = [mode * friction.loss if friction else 0.0 for friction, mode in pairs]
+    rates = [friction.rate if friction else 0.0 for friction in frictions]
+    pulls = [
+        slide - grip * rate * velocity
+        for slide, grip, rate, velocity in zip(slides, grips, rates, velocities, strict=True)
     ]
-    slides = [
-        mode * friction.loss if friction else 0.0
-        for friction, mode in zip(frictions, modes, strict=True)
-    ]
-    moved = _accelerations(frictions, grips, slides, inertia, velocities, smooth)
+    moved = _accelerations(grips, pulls, inertia, smooth)
     forces: list[Number] = [0.0, 0.0]
     excess: Number = 0.0
-    for joint, (friction, mode) in enumerate(zip(frictions, modes, strict=True)):
+    for joint, (friction, mode) in enumerate(pairs):
         if friction:
             grip = -(friction.rate * velocities[joint] + moved[joint]) / friction.softness
             forces[joint] = slides[joint] if mode else grip
@@ -104,21 +104,9 @@ def _try(
     return (forces[0], forces[1]), excess
 
 
-def _accelerations(
-    frictions: Frictions,
-    grips: list[float],
-    slides: list[float],
-    inertia: Inertia,
-    velocities: Pair,
-    smooth: Pair,
-) -> Pair:
+def _accelerations(grips: list[float], pulls: list[Number], inertia: Inertia, smooth: Pair) -> Pair:
     """Return accelerations with some joints gripped, each as if heavier, and others sliding."""
     slider, shared, hinge = inertia
-    rates = [friction.rate if friction else 0.0 for friction in frictions]
-    pulls = [
-        slide - grip * rate * velocity
-        for slide, grip, rate, velocity in zip(slides, grips, rates, velocities, strict=True)
-    ]
     push = slider * smooth[0] + shared * smooth[1] + pulls[0]
     turn = shared * smooth[0] + hinge * smooth[1] + pulls[1]
     a, b = slider + grips[0], hinge + grips[1]

@@ -121,7 +121,8 @@ def apply_meanings(document: Document, values: Mapping[str, float], name: str) -
     after = build(document.text, name)
     _check_outcome(_found(after), whole)
     for pole, wanted in enumerate(by_pole):
-        _check_outcome(_found_of_pole(after, pole), wanted)
+        found = _found_of_joint(after, after.hinges[pole], "hinge")
+        _check_outcome({"pole.mass": pole_of(after, pole).mass, **found}, wanted)
         _check_centre(after, pole, centres[pole])
 
 
@@ -242,16 +243,9 @@ def _found(cartpole: CartPole) -> dict[str, float]:
     }
 
 
-def _found_of_pole(cartpole: CartPole, pole: int) -> dict[str, float]:
-    mass = pole_of(cartpole, pole).mass
-    return {"pole.mass": mass, **_found_of_joint(cartpole, cartpole.hinges[pole], "hinge")}
-
-
 def _found_of_joint(cartpole: CartPole, joint: int, part: str) -> dict[str, float]:
-    return {
-        f"{part}.{word}": _joint_value(cartpole, joint, name)
-        for word, name in _JOINT_ATTRIBUTES.items()
-    }
+    values = {word: _joint_value(cartpole, joint, name) for word, name in _JOINT_ATTRIBUTES.items()}
+    return {f"{part}.{word}": value for word, value in values.items()}
 
 
 def _check_outcome(found: Mapping[str, float], values: Mapping[str, float]) -> None:
