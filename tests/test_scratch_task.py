@@ -12,6 +12,7 @@ import mjcartpole
 from mjcartpole.cli import main
 from mjcartpole.envs.backend import make_env
 from mjcartpole.envs.registration import env_id
+from mjcartpole.errors import ConfigError
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.training import train
 from mjcartpole.studies.evaluation import evaluate
@@ -83,6 +84,12 @@ def test_the_rules_hold_on_both_sides_of_a_limit(backend):
         _, reward, terminated, _, _ = env.step(1)
         assert terminated is over
         assert reward == -abs(env.unwrapped.state[2]) - 10.0 * over
+
+
+def test_a_config_takes_a_known_task_itself():
+    assert TrainConfig(task=NARROW) == TrainConfig(task=NARROW.name)
+    with pytest.raises(ConfigError, match="'unheard-of' is unknown; available: .*Narrow-v0"):
+        TrainConfig(task=Task("unheard-of"))
 
 
 def test_environments_are_made_by_name():

@@ -20,6 +20,7 @@ from mjcartpole.task import (
     CARTPOLE_V1,
     Task,
     in_words,
+    resolve,
     state_names,
     task_named,
 )
@@ -155,6 +156,7 @@ class TrainConfig:
         check_backend(
             self.backend, self.model, self.integrator, self.set, own_timestep=self.own_timestep
         )
+        object.__setattr__(self, "task", resolve(self.task).name)
         _ = self.rules
         self._check_counts()
         self._check_dimensions()
