@@ -88,7 +88,7 @@ def test_the_rules_hold_on_both_sides_of_a_limit(backend):
 
 def test_a_config_takes_a_known_task_itself():
     assert TrainConfig(task=NARROW) == TrainConfig(task=NARROW.name)
-    with pytest.raises(ConfigError, match="'unheard-of' is unknown; available: .*Narrow-v0"):
+    with pytest.raises(ConfigError, match=r"'unheard-of' is unknown; available: .*Narrow-v0"):
         TrainConfig(task=Task("unheard-of"))
 
 
