@@ -13,12 +13,11 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 from PIL import GifImagePlugin, Image
 
 from mjcartpole.errors import RenderError
+from mjcartpole.media.frames import Frame
 
-Frame = npt.NDArray[np.uint8]
 Box = tuple[int, int, int, int]
 """Left, top, right, bottom in pixels; the last two are outside."""
 

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from mjcartpole.errors import RenderError
+from mjcartpole.media.frames import check_frame
 from mjcartpole.media.palette import FAINT, INK, LINE, PAPER, Colour
 from mjcartpole.media.text import Lettering, Pixels
 
@@ -196,18 +197,9 @@ def _of_one_size(frames: Sequence[Pixels | None]) -> list[Pixels]:
     for index, frame in enumerate(frames):
         if frame is None:
             raise RenderError(f"film {index} has no frame; each needs at least one")
-        if frame.ndim != 3 or frame.shape[2] != 3 or frame.dtype != np.uint8:
-            raise RenderError(
-                f"picture {index} is an array of shape {frame.shape} and {frame.dtype}; "
-                "needed are (height, width, 3) and uint8"
-            )
     checked = [frame for frame in frames if frame is not None]
     for index, frame in enumerate(checked):
-        if frame.shape != checked[0].shape:
-            raise RenderError(
-                f"picture {index} is {frame.shape[1]}x{frame.shape[0]} pixels, the first one "
-                f"{checked[0].shape[1]}x{checked[0].shape[0]}; all in a grid have one size"
-            )
+        check_frame(frame, f"picture {index}", checked[0].shape, "in a grid")
     return checked
 
 

@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
-import numpy.typing as npt
 
 from mjcartpole.errors import RenderError
 from mjcartpole.files import brief
+from mjcartpole.media.frames import Frame
 
 if TYPE_CHECKING:
     import av
@@ -52,7 +52,7 @@ def even(size: tuple[int, int]) -> tuple[int, int]:
     return width - width % 2, height - height % 2
 
 
-def write_mp4(path: Path, frames: Iterator[npt.NDArray[np.uint8]], fps: float) -> int:
+def write_mp4(path: Path, frames: Iterator[Frame], fps: float) -> int:
     """Write frames as H.264 with 4:2:0 colours, with the index first; returns their number.
 
     PyAV itself and not imageio's plugin, which keeps the codec's options and the colours'
@@ -86,7 +86,7 @@ def write_mp4(path: Path, frames: Iterator[npt.NDArray[np.uint8]], fps: float) -
     return count
 
 
-def _converted(frames: Iterator[npt.NDArray[np.uint8]]) -> "Iterator[av.VideoFrame]":
+def _converted(frames: Iterator[Frame]) -> "Iterator[av.VideoFrame]":
     """Yield frames as H.264 takes them."""
     import av  # noqa: PLC0415
     from av.video.reformatter import ColorRange, Colorspace, VideoReformatter  # noqa: PLC0415

@@ -7,17 +7,15 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
-import numpy as np
-import numpy.typing as npt
-
 from mjcartpole.errors import FileError
 from mjcartpole.files import make_folder
 from mjcartpole.leftovers import name_aside, temporary_beside
+from mjcartpole.media.frames import Frame
 
 _NUMBERED: Final = re.compile(r"\d{6,}\.png")
 
 
-def write_pictures(folder: Path, frames: Iterator[npt.NDArray[np.uint8]], fps: float) -> int:
+def write_pictures(folder: Path, frames: Iterator[Frame], fps: float) -> int:
     """Write frames as 000000.png, 000001.png, … into a folder; returns their number.
 
     Args:

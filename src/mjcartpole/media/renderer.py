@@ -222,17 +222,6 @@ class GLRenderer(TakesTurns):
                 self._context.release()
             self._context.free()
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        self.close()
-
     def __del__(self) -> None:
         # Frees in order where nobody has; __init__ may have failed before there was anything.
         if hasattr(self, "_context"):

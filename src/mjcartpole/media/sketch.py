@@ -6,8 +6,7 @@ and then reduced, which smooths the edges; the rest comes from a picture made on
 """
 
 import math
-from types import TracebackType
-from typing import Final, Self
+from typing import Final
 
 import mujoco
 import numpy as np
@@ -114,17 +113,6 @@ class SketchRenderer(TakesTurns):
         self._is_closed = True
         self._background = None
         self._static = {}
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        self.close()
 
 
 def _bounds(outlines: list[Outline], whole: Box) -> Box | None:

@@ -5,13 +5,15 @@ the midst of a driver or of MuJoCo that is a crash. So at exit those that are dr
 for, and a thread that begins after that is held until it goes down with the process.
 """
 
+import abc
 import atexit
 import contextlib
 import functools
 import os
 import threading
 from collections.abc import Iterator
-from typing import Final
+from types import TracebackType
+from typing import Final, Self
 
 _PATIENCE: Final = 10.0
 """Seconds that a driver has to finish a frame at exit."""
@@ -19,8 +21,8 @@ _STEPS: Final = 0.3
 """Seconds for a thread to come from one frame to the next, so that it is held here at exit."""
 
 
-class TakesTurns:
-    """Something that any thread may use, and one at a time does."""
+class TakesTurns(abc.ABC):
+    """Something that any thread may use, and one at a time does; closed at the end of a `with`."""
 
     def __init__(self) -> None:
         """It is nobody's turn yet."""
@@ -32,6 +34,21 @@ class TakesTurns:
         """Keep other threads out, and the process alive, until this is done."""
         with drawing(), self._turn:
             yield
+
+    @abc.abstractmethod
+    def close(self) -> None:
+        """Free what it holds; a second call does nothing."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
 
 
 _change = threading.Condition()

@@ -14,16 +14,11 @@ from pathlib import Path
 from types import FrameType
 from typing import Final, NoReturn
 
-import numpy as np
-import numpy.typing as npt
-
 from mjcartpole.errors import RenderError
 from mjcartpole.files import atomic_write
+from mjcartpole.media.frames import Frame, check_frame
 from mjcartpole.media.mp4 import even, why_no_mp4, write_mp4
 from mjcartpole.media.pictures import check_folder, replacing_folder, write_pictures
-
-Frame = npt.NDArray[np.uint8]
-"""A picture of shape (height, width, 3): red, green, blue."""
 
 Writer = Callable[[Path, Iterator[Frame], float], int]
 """Writes frames, so many per second, into a file or folder; returns their number."""
@@ -164,27 +159,14 @@ def _peek(frames: Iterable[Frame]) -> tuple[Frame, Iterator[Frame]]:
     first = next(stream, None)
     if first is None:
         raise RenderError("a video needs at least one frame; none came")
-    _check(first, 0, first.shape)
+    check_frame(first, "frame 0", first.shape, "frames of a video")
     return first, itertools.chain([first], stream)
 
 
 def _checked(frames: Iterator[Frame], shape: tuple[int, ...]) -> Iterator[Frame]:
     for index, frame in enumerate(frames):
-        _check(frame, index, shape)
+        check_frame(frame, f"frame {index}", shape, "frames of a video")
         yield frame
-
-
-def _check(frame: Frame, index: int, shape: tuple[int, ...]) -> None:
-    if frame.ndim != 3 or frame.shape[2] != 3 or frame.dtype != np.uint8 or not frame.size:
-        raise RenderError(
-            f"frame {index} is an array of shape {frame.shape} and {frame.dtype}; "
-            "needed are (height, width, 3) and uint8"
-        )
-    if frame.shape != shape:
-        raise RenderError(
-            f"frame {index} is {frame.shape[1]}x{frame.shape[0]} pixels, the first one "
-            f"{shape[1]}x{shape[0]}; all frames of a video have one size"
-        )
 
 
 class _StoppedError(Exception):
