@@ -25,14 +25,14 @@ from benchmarks.ratios import Ratio, compare, seconds
 from mujoco.batch import Batch
 
 import mjcartpole
+from mjcartpole.cores import available_cores
 from mjcartpole.envs.backend import Backend
 from mjcartpole.files import write_whole
 from mjcartpole.learning import runs
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.training import Training, train
-from mjcartpole.physics.batch_simulation import available_cores
 from mjcartpole.physics.load import load_model
-from mjcartpole.studies.many import train_many
+from mjcartpole.studies.multi_seed import train_many
 
 Section = Callable[[bool], Iterator[Ratio]]
 

@@ -11,13 +11,13 @@ Seeds start at --first-seed, so that settings chosen on some seeds can be confir
 import argparse
 import json
 import multiprocessing
-import os
 import time
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from mjcartpole.cores import available_cores
 from mjcartpole.learning.config import PRESETS, TrainConfig
 from mjcartpole.learning.training import train
 from mjcartpole.studies.evaluation import evaluate
@@ -112,7 +112,7 @@ def main() -> None:
     parser.add_argument("--backends", nargs="*", default=["mujoco"], choices=["mujoco", "gym"])
     parser.add_argument("--seeds", type=int, default=20)
     parser.add_argument("--first-seed", type=int, default=1_000)
-    parser.add_argument("--workers", type=int, default=os.cpu_count())
+    parser.add_argument("--workers", type=int, default=available_cores())
     parser.add_argument("--json", type=Path, help="write every seed's figures here")
     options = parser.parse_args()
     print(

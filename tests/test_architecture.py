@@ -16,6 +16,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = Path(mjcartpole.__file__).parent
 LAYERS = [
     "errors",
+    "cores",
     "task",
     "integrator",
     "leftovers",

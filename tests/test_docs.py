@@ -107,8 +107,8 @@ PICTURES = {
 
 PLAIN = {
     "models/                 MJCF files, hand-written and commented; they ship inside the wheel",
-    "errors ← task ← integrator ← leftovers ← files ← versions ← physics ← media ← envs ← learning"
-    " ← studies ← commands ← cli",
+    "errors ← cores ← task ← integrator ← leftovers ← files ← versions ← physics ← media ← envs"
+    " ← learning ← studies ← commands ← cli",
     "Q(s, a) ← Q(s, a) + α (G − Q(s, a))",  # noqa: RUF001 - a formula
     "G_t = r_t + γ ((1 − λ) max Q(s_t+1, ·) + λ G_t+1)",  # noqa: RUF001 - a formula
 }

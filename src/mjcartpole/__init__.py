@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     from mjcartpole.physics.load import load_model, model_names
     from mjcartpole.physics.simulation import Simulation
     from mjcartpole.studies.evaluation import Evaluation, evaluate
-    from mjcartpole.studies.many import train_many
-    from mjcartpole.studies.multi_seed import ManyResult
+    from mjcartpole.studies.multi_seed import train_many
+    from mjcartpole.studies.seeds import ManyResult
 
 __version__ = "0.1.0"
 
@@ -57,7 +57,7 @@ _HOMES = {
     "CartPoleEnv": "envs.cartpole",
     "CartPoleVectorEnv": "envs.vector",
     "Evaluation": "studies.evaluation",
-    "ManyResult": "studies.multi_seed",
+    "ManyResult": "studies.seeds",
     "Policy": "learning.policy",
     "Simulation": "physics.simulation",
     "TrainConfig": "learning.config",
@@ -66,7 +66,7 @@ _HOMES = {
     "load_model": "physics.load",
     "model_names": "physics.load",
     "train": "learning.training",
-    "train_many": "studies.many",
+    "train_many": "studies.multi_seed",
 }
 
 register()

@@ -7,7 +7,7 @@ import pytest
 from mujoco.batch import Batch
 
 from mjcartpole.physics import batch_simulation
-from mjcartpole.physics.batch_simulation import BatchSimulation, available_cores
+from mjcartpole.physics.batch_simulation import BatchSimulation
 from mjcartpole.physics.load import load_model
 
 MODEL = load_model("cartpole", {"joint:hinge.damping": 0.01})
@@ -86,7 +86,3 @@ def test_few_simulations_never_wake_many_threads(n, timestep, cores, threads, mo
     assert simulation.threads == threads
     assert (simulation._other is None) == (threads == 1)
     assert BatchSimulation(cartpole, n, threads=3).threads == min(3, n)
-
-
-def test_there_is_a_core():
-    assert available_cores() >= 1

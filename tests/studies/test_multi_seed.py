@@ -1,18 +1,22 @@
 """Many seeds side by side, each as if it were trained alone."""
 
+import dataclasses
+import doctest
 import itertools
+import json
 
 import numpy as np
 import pytest
 
-from mjcartpole.errors import ConfigError, ModelError
+from mjcartpole.cores import available_cores
+from mjcartpole.errors import ConfigError, ModelError, RunError
 from mjcartpole.learning.config import TrainConfig
+from mjcartpole.learning.policy import Policy
 from mjcartpole.learning.training import train
-from mjcartpole.physics.batch_simulation import available_cores
 from mjcartpole.physics.load import load_model
+from mjcartpole.studies import multi_seed
 from mjcartpole.studies.evaluation import evaluate
-from mjcartpole.studies.many import train_many
-from mjcartpole.studies.multi_seed import ManyResult, SeedResult, SeedRunner
+from mjcartpole.studies.multi_seed import SeedRunner, train_many
 
 CONFIG = TrainConfig(episodes=15, backend="gym", seed=4)
 
@@ -110,26 +114,9 @@ def test_a_crew_can_be_stopped(engine):
     assert all(found.score is None and found.error == "" for found in runner.result().seeds)
 
 
-@pytest.mark.parametrize(
-    ("seeds", "message"),
-    [
-        (0, "from 1 to 100,000, not 0"),
-        (-1, "not -1"),
-        (100_001, "not 100001"),
-        ([], "at least one"),
-        ([1, 2, 1], "different"),
-        ([-1], "seed must be"),
-        ([0.5], "seed must be"),
-    ],
-)
-def test_seeds_that_make_no_sense(seeds, message):
-    with pytest.raises(ConfigError, match=message):
-        train_many(CONFIG, seeds)
-
-
 @pytest.mark.parametrize("workers", [0, -3])
 def test_workers_that_make_no_sense(workers):
-    with pytest.raises(ConfigError, match="workers must be a number from 1 up"):
+    with pytest.raises(ConfigError, match="workers must be a whole number from 1 up"):
         train_many(CONFIG, 2, workers=workers)
 
 
@@ -145,12 +132,21 @@ def test_no_more_workers_than_seeds():
     assert 1 <= SeedRunner(CONFIG, 999, load_model()).workers == available_cores()
 
 
-def test_what_a_notebook_shows_is_short():
-    many = train_many(TrainConfig(backend="gym", episodes=5), seeds=3)
-    scores = many.scores
-    figures = f"mean {sum(scores) / 3:.2f}, least {min(scores):.2f}"
-    assert repr(many) == f"ManyResult(3 of 3 seeds evaluated, {figures})"
-    assert repr(many.seeds[1]) == f"SeedResult(1: {many.seeds[1].evaluation!r})"
-    assert repr(SeedResult(7, error="it fell")) == "SeedResult(7: it fell)"
-    nothing = ManyResult(many.config, (SeedResult(7),))
-    assert repr(nothing) == "ManyResult(0 of 1 seeds evaluated)"
+def test_a_folder_holds_a_run_for_each_seed_and_the_statistics(tmp_path):
+    folder = tmp_path / "many"
+    found = train_many(CONFIG, 3, workers=2, run_dir=folder)
+    for one, seed in zip(found.seeds, (4, 5, 6), strict=True):
+        alone = train(dataclasses.replace(CONFIG, seed=seed))
+        stored = Policy.load(folder / f"seed-{seed}" / "policy.json")
+        assert one.result.q_table.tobytes() == alone.q_table.tobytes() == stored.q_table.tobytes()
+    written = json.loads((folder / "aggregate.json").read_text())
+    assert written["greedy_return"] == found.aggregate().summary()
+    with pytest.raises(RunError, match="exists"):
+        train_many(CONFIG, 3, run_dir=folder)
+    again = train_many(CONFIG, 2, run_dir=folder, overwrite=True)
+    assert [one.seed for one in again.seeds] == [4, 5]
+    assert sorted(path.name for path in folder.glob("seed-*")) == ["seed-4", "seed-5"]
+
+
+def test_the_docstrings_hold():
+    assert doctest.testmod(multi_seed).failed == 0

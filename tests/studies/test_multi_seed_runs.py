@@ -12,7 +12,8 @@ from mjcartpole.learning.episodes import Episode
 from mjcartpole.physics.load import load_model, same_model
 from mjcartpole.studies import multi_seed_runs
 from mjcartpole.studies.evaluation import Evaluation
-from mjcartpole.studies.multi_seed import ManyResult, SeedResult, SeedRunner
+from mjcartpole.studies.multi_seed import SeedRunner
+from mjcartpole.studies.seeds import ManyResult, SeedResult
 
 CONFIG = TrainConfig(episodes=5, backend="gym", seed=2)
 

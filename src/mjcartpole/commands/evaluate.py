@@ -13,7 +13,7 @@ from mjcartpole.studies.evaluation import EPISODES, Evaluation, evaluate
 
 if TYPE_CHECKING:
     from mjcartpole.studies.film import PolicySetup
-    from mjcartpole.studies.multi_seed import ManyResult
+    from mjcartpole.studies.seeds import ManyResult
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class Evaluate(Command):
     def _run_seeds(self) -> int:
         from mjcartpole.commands.policies import learned_seeds, set_up
         from mjcartpole.learning.documents import read_config
-        from mjcartpole.studies.multi_seed import ManyResult, SeedResult
+        from mjcartpole.studies.seeds import ManyResult, SeedResult
 
         learned = learned_seeds(self.source)
         setups = {seed: set_up(run, self.target) for seed, run in learned.items()}

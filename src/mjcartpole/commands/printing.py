@@ -6,7 +6,7 @@ from mjcartpole.studies.evaluation import Evaluation
 from mjcartpole.studies.statistics import CONFIDENCE
 
 if TYPE_CHECKING:
-    from mjcartpole.studies.multi_seed import ManyResult
+    from mjcartpole.studies.seeds import ManyResult
 
 
 def plain(value: float) -> str:

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass
 from typing import Any, Final, get_args
 
+from mjcartpole.cores import available_cores
 from mjcartpole.media import gl
 from mjcartpole.media.backend_probe import Backend, Trial, try_backend
 from mjcartpole.media.mp4 import CODEC, why_no_mp4
@@ -181,7 +182,7 @@ def _system() -> dict[str, str]:
     except OSError:
         name = platform.platform(terse=True)
     return {
-        "platform": f"{name}, {platform.machine()}, {os.cpu_count()} cores",
+        "platform": f"{name}, {platform.machine()}, {available_cores()} cores",
         "python": f"{platform.python_version()} ({sys.executable})",
     }
 

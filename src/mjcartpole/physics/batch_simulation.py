@@ -1,7 +1,6 @@
 """Many cart-poles in motion: `mujoco.batch`, on as many threads as pay."""
 
 import collections
-import os
 import statistics
 import time
 from typing import Any, Final
@@ -11,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from mujoco import batch as mujoco_batch
 
+from mjcartpole.cores import available_cores
 from mjcartpole.errors import ConfigError
 from mjcartpole.integrator import Integrator, check_integrator
 from mjcartpole.physics.cartpole import CartPole, Vector
@@ -186,13 +186,6 @@ class BatchSimulation:
         else:
             self._until_choice, self._to_beat = _TRIAL, took
         self._laps.clear()
-
-
-def available_cores() -> int:
-    """Return cores that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def _largest_crew(n: int, substeps: int) -> int:

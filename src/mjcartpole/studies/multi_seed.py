@@ -1,112 +1,60 @@
-"""One config, many seeds, side by side: each as if it were trained alone."""
+"""Many seeds of one config, side by side: each as if it were trained alone."""
 
 import concurrent.futures
 import contextlib
 import dataclasses
 import multiprocessing
 import os
-import reprlib
 import signal
 import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future
 from dataclasses import dataclass
 from multiprocessing.synchronize import Event
 from pathlib import Path
 
-from mjcartpole.errors import ConfigError, MjCartPoleError, RunError
+from mjcartpole.cores import worker_count
+from mjcartpole.errors import MjCartPoleError, RunError
 from mjcartpole.learning import runs
 from mjcartpole.learning.checkpoints import Checkpoint
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.documents import CONFIG
 from mjcartpole.learning.engine import Engine, choose_engine
+from mjcartpole.learning.run_model import check_storable
 from mjcartpole.learning.session import CHECKPOINT_EVERY, Session
-from mjcartpole.learning.training import Training, TrainResult
-from mjcartpole.physics.batch_simulation import available_cores
+from mjcartpole.learning.training import Training
 from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.load import load_model, load_named
-from mjcartpole.studies.evaluation import Evaluation
+from mjcartpole.studies import multi_seed_runs
 from mjcartpole.studies.finish_training import evaluate_where_trained, finish_training
-from mjcartpole.studies.statistics import Aggregate, aggregate
-
-MAX_SEEDS = 100_000
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class SeedResult:
-    """What one seed has come to.
-
-    Attributes:
-        seed: The seed.
-        evaluation: The greedy evaluation; None if the seed failed or was stopped.
-        result: What was learned; None if the seed failed, or was complete on disk before.
-        error: Why it failed; empty if it did not.
-    """
-
-    seed: int
-    evaluation: Evaluation | None = None
-    result: TrainResult | None = None
-    error: str = ""
-
-    @property
-    def score(self) -> float | None:
-        """Mean greedy return."""
-        return None if self.evaluation is None else self.evaluation.mean
-
-    def __repr__(self) -> str:
-        outcome = self.error or self.evaluation or "not finished"
-        return f"SeedResult({self.seed}: {outcome})"
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class ManyResult:
-    """What many seeds have come to.
-
-    Attributes:
-        config: What was trained; its seed is the first.
-        seeds: One result for each, in order.
-    """
-
-    config: TrainConfig
-    seeds: tuple[SeedResult, ...]
-
-    @property
-    def scores(self) -> list[float]:
-        """Mean greedy return of each seed that was evaluated."""
-        return [found.score for found in self.seeds if found.score is not None]
-
-    @property
-    def failed(self) -> list[SeedResult]:
-        """The seeds that ended in an error."""
-        return [found for found in self.seeds if found.error]
-
-    def aggregate(self) -> Aggregate | None:
-        """Statistics over the scores; None where there are none."""
-        if not self.scores:
-            return None
-        return aggregate(self.scores, solved_at=self.config.rules.reward_threshold)
-
-    def __repr__(self) -> str:
-        count, scores = len(self.seeds), self.scores
-        reached = (
-            f", mean {sum(scores) / len(scores):.2f}, least {min(scores):.2f}" if scores else ""
-        )
-        return f"ManyResult({len(scores)} of {count} seeds evaluated{reached})"
+from mjcartpole.studies.seeds import ManyResult, SeedResult, check_seeds, seed_folder
 
 
 @dataclass(frozen=True)
 class _Job:
-    """One seed, in a form that another process can be given."""
+    """One seed's training, in a form that another process can be given.
+
+    Attributes:
+        document: The model's, where it is loaded already.
+        folder: The run's; None keeps nothing.
+    """
 
     config: TrainConfig
     engine: Engine
     document: str | None
-    """The model's, where it is loaded already."""
     folder: Path | None
     preset: str
     every: float
     events: bool
     allow_assets: tuple[Path, ...]
+
+    def of(self, seed: int) -> "_Job":
+        """Return the same with another seed, in that one's folder of many."""
+        folder = None if self.folder is None else seed_folder(self.folder, seed)
+        return dataclasses.replace(
+            self, config=dataclasses.replace(self.config, seed=seed), folder=folder
+        )
 
 
 class SeedRunner:
@@ -149,23 +97,11 @@ class SeedRunner:
             ConfigError: The seeds or workers make no sense.
         """
         self.seeds = check_seeds(config, seeds)
-        self.workers = min(_check_workers(workers), len(self.seeds))
-        self._config = config
+        self.workers = worker_count(workers, len(self.seeds))
         on_mujoco = config.backend == "mujoco"
-        self._engine = choose_engine(engine, config.backend, cartpole if on_mujoco else None)
-        self._jobs = [
-            _Job(
-                config=dataclasses.replace(config, seed=seed),
-                engine=self._engine,
-                document=cartpole.xml if on_mujoco else None,
-                folder=None if folder is None else seed_folder(folder, seed),
-                preset=preset,
-                every=every,
-                events=events,
-                allow_assets=allow_assets,
-            )
-            for seed in self.seeds
-        ]
+        engine = choose_engine(engine, config.backend, cartpole if on_mujoco else None)
+        document = cartpole.xml if on_mujoco else None
+        self._job = _Job(config, engine, document, folder, preset, every, events, allow_assets)
         self._found: dict[int, SeedResult] = {}
 
     def run(self, stop: Callable[[], bool]) -> Iterator[SeedResult | None]:
@@ -174,22 +110,23 @@ class SeedRunner:
         Yields:
             Each seed's result when it has come, and None now and then while waiting.
         """
-        work = self._in_threads if self._engine == "compiled" else self._in_processes
-        for found in work(stop):
+        # The compiled engine leaves Python's lock alone.
+        in_threads = self._job.engine == "compiled"
+        for found in (self._in_threads if in_threads else self._in_processes)(stop):
             if found is not None:
                 self._found[found.seed] = found
             yield found
 
     def result(self) -> ManyResult:
-        """The seeds that have come to something, in order."""
-        return ManyResult(
-            self._config, tuple(self._found[seed] for seed in self.seeds if seed in self._found)
-        )
+        """Return the seeds that have come to something, in order."""
+        found = tuple(self._found[seed] for seed in self.seeds if seed in self._found)
+        return ManyResult(self._job.config, found)
 
     def _in_threads(self, stop: Callable[[], bool]) -> Iterator[SeedResult | None]:
         with concurrent.futures.ThreadPoolExecutor(self.workers) as pool:
-            futures = {pool.submit(_train_seed, job, stop): job.config.seed for job in self._jobs}
-            yield from _as_they_come(futures)
+            yield from _as_they_come(
+                {pool.submit(_train_seed, self._job.of(seed), stop): seed for seed in self.seeds}
+            )
 
     def _in_processes(self, stop: Callable[[], bool]) -> Iterator[SeedResult | None]:
         # A fresh interpreter each: nothing of OpenGL or threads is inherited.
@@ -201,7 +138,8 @@ class SeedRunner:
         ) as pool:
             with _signals_for_parent():
                 futures = {
-                    pool.submit(_train_seed_in_worker, job): job.config.seed for job in self._jobs
+                    pool.submit(_train_seed_in_worker, self._job.of(seed)): seed
+                    for seed in self.seeds
                 }
             try:
                 for found in _as_they_come(futures):
@@ -212,9 +150,60 @@ class SeedRunner:
                 stopped.set()
 
 
-def _as_they_come(
-    futures: "dict[concurrent.futures.Future[SeedResult], int]",
-) -> Iterator[SeedResult | None]:
+def train_many(
+    config: TrainConfig,
+    seeds: int | Sequence[int],
+    *,
+    workers: int | None = None,
+    engine: Engine = "compiled",
+    run_dir: Path | None = None,
+    overwrite: bool = False,
+) -> ManyResult:
+    """Train one config with many seeds at once.
+
+    >>> many = train_many(TrainConfig(episodes=5, backend="gym"), seeds=3, workers=2)
+    >>> [found.seed for found in many.seeds]
+    [0, 1, 2]
+    >>> many.aggregate().count
+    3
+
+    Args:
+        config: What to train.
+        seeds: Which seeds; a number stands for that many from the config's own seed on.
+        workers: How many at once; as many as there are cores if left out. The compiled engine runs
+            in threads, since it leaves Python's lock alone, and the Python engine in processes.
+        engine: Who runs the loop.
+        run_dir: Keeps a run per seed in this folder, and statistics over them, as
+            `mjcartpole train --seeds` does; nothing is written if left out.
+        overwrite: Replace what the folder holds of this kind.
+
+    Raises:
+        ConfigError: The seeds or workers make no sense.
+        ModelError: The model cannot be used.
+        FileError: The folder is taken or cannot be written.
+    """
+    cartpole = config.load_model()
+    config.discretizer(cartpole.poles)
+    runner = SeedRunner(
+        config, seeds, cartpole, workers=workers, engine=engine, folder=run_dir, preset="custom"
+    )
+    if run_dir is None:
+        return _finished(runner)
+    check_storable(cartpole)
+    with multi_seed_runs.claimed_seeds(run_dir, overwrite=overwrite):
+        multi_seed_runs.begin_seeds(run_dir, config, runner.seeds, cartpole, preset="custom")
+        many = _finished(runner)
+        multi_seed_runs.write_seeds(run_dir, many)
+    return many
+
+
+def _finished(runner: SeedRunner) -> ManyResult:
+    for _ in runner.run(lambda: False):
+        pass
+    return runner.result()
+
+
+def _as_they_come(futures: dict[Future[SeedResult], int]) -> Iterator[SeedResult | None]:
     waiting = set(futures)
     while waiting:
         done, waiting = concurrent.futures.wait(
@@ -224,7 +213,7 @@ def _as_they_come(
         yield None
 
 
-def _result_of(future: "concurrent.futures.Future[SeedResult]", seed: int) -> SeedResult:
+def _result_of(future: Future[SeedResult], seed: int) -> SeedResult:
     try:
         return future.result()
     except (concurrent.futures.BrokenExecutor, OSError) as error:
@@ -261,7 +250,7 @@ def _begin_worker(stopped: Event) -> None:
 
 
 def _end_with_parent() -> None:
-    """A worker outlives a parent that was killed, and would keep its folders locked."""
+    """End with a parent that was killed: a worker would keep its folders locked."""
     parent = multiprocessing.parent_process()
     assert parent is not None
     parent.join()
@@ -345,36 +334,3 @@ def _begun(job: _Job, folder: Path, cartpole: CartPole) -> Iterator[Checkpoint |
 def _check_same(job: _Job, folder: Path, config: TrainConfig) -> None:
     if config != job.config:
         raise RunError(f"'{folder}' holds a run with another config")
-
-
-def seed_folder(folder: Path, seed: int) -> Path:
-    """Where one seed's run lies in the folder of many."""
-    return folder / f"seed-{seed}"
-
-
-def check_seeds(config: TrainConfig, seeds: int | Sequence[int]) -> tuple[int, ...]:
-    """The seeds that are meant; a number stands for that many from the config's own on.
-
-    Raises:
-        ConfigError: They are too many, none, the same twice, or no seeds.
-    """
-    if isinstance(seeds, int):
-        if not 1 <= seeds <= MAX_SEEDS:
-            raise ConfigError(f"seeds must be a number from 1 to {MAX_SEEDS:,}, not {seeds}")
-        seeds = range(config.seed, config.seed + seeds)
-    if not 1 <= len(seeds) <= MAX_SEEDS or len(set(seeds)) != len(seeds):
-        raise ConfigError(
-            f"seeds must be different numbers, at least one and at most {MAX_SEEDS:,}, "
-            f"not {reprlib.repr(list(seeds))}"
-        )
-    for seed in (min(seeds), max(seeds)):
-        _ = dataclasses.replace(config, seed=seed)
-    return tuple(seeds)
-
-
-def _check_workers(workers: int | None) -> int:
-    if workers is None:
-        return available_cores()
-    if workers < 1:
-        raise ConfigError(f"workers must be a number from 1 up, not {workers}")
-    return workers

@@ -24,7 +24,7 @@ from mjcartpole.learning.folders import SEEDS, check_here, held_folder, locked_f
 from mjcartpole.learning.run_model import MODEL, read_model, remove_assets, write_model
 from mjcartpole.learning.stored import Fields, read_document
 from mjcartpole.physics.cartpole import CartPole
-from mjcartpole.studies.multi_seed import ManyResult, check_seeds, seed_folder
+from mjcartpole.studies.seeds import ManyResult, check_seeds, seed_folder
 
 TABLE, AGGREGATE = "seeds.csv", "aggregate.json"
 FILES: Final = (SEEDS, TABLE, AGGREGATE, MODEL, runs.VERSIONS)
@@ -51,12 +51,12 @@ class ManyBegun:
 
 
 def is_seeds(path: Path) -> bool:
-    """Whether a path is a folder of many seeds."""
+    """Return whether a path is a folder of many seeds."""
     return is_file(path / SEEDS)
 
 
 def learned_seeds(folder: Path) -> tuple[dict[int, Path], list[int]]:
-    """The runs of a folder of many seeds that have a policy, by seed, and the seeds without.
+    """Return the runs of a folder of many seeds that have a policy, by seed, and the seeds without.
 
     Raises:
         RunError: There is no policy yet, or the folder is damaged.
@@ -177,7 +177,7 @@ def _clear(folder: Path) -> None:
 
 
 def _read_seeds(folder: Path) -> tuple[str, TrainConfig, tuple[int, ...]]:
-    """Preset, config and seeds."""
+    """Return preset, config and seeds."""
 
     def made(about: dict[str, Any]) -> tuple[str, TrainConfig, tuple[int, ...]]:
         config = read_values(about["config"])

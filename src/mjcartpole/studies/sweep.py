@@ -16,6 +16,7 @@ from mjcartpole.physics.edit.edits import edits_of
 from mjcartpole.physics.load import Edits, ModelLike, load_model
 from mjcartpole.studies.evaluation import EPISODES, SEED, check_count
 from mjcartpole.studies.transfer import GYM, Cell, TransferResult, find_place, transfer
+from mjcartpole.task import CARTPOLE_V1, Task
 
 MOST_VALUES: Final = 1_000
 
@@ -154,6 +155,7 @@ def sweep(
     edits: Edits = None,
     integrator: Integrator = "gym",
     own_timestep: bool = False,
+    task: Task | str = CARTPOLE_V1,
     episodes: int = EPISODES,
     seed: int = SEED,
     workers: int | None = None,
@@ -168,6 +170,7 @@ def sweep(
         edits: What else is changed, at all values; see `load_model`.
         integrator: See `Simulation`.
         own_timestep: See `load_model`.
+        task: The rules, or their name.
         episodes: Greedy episodes for each policy and value.
         seed: Seeds the starting states and the bootstrap.
         workers: How many at once; as many as there are cores if left out.
@@ -185,7 +188,7 @@ def sweep(
         find_place(base, {**others, key: value}, integrator, own_timestep=own_timestep)
         for value in values
     ]
-    played = transfer(policies, places, episodes=episodes, seed=seed, workers=workers)
+    played = transfer(policies, places, task=task, episodes=episodes, seed=seed, workers=workers)
     return SweepResult(key, tuple(map(float, values)), base.name, played)
 
 

@@ -1,7 +1,6 @@
 """How far does a policy carry? Every policy on every model, from the same starting states."""
 
 import concurrent.futures
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
@@ -9,6 +8,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
+from mjcartpole.cores import worker_count
 from mjcartpole.envs.backend import Backend
 from mjcartpole.errors import ConfigError, MjCartPoleError
 from mjcartpole.integrator import Integrator
@@ -17,7 +17,7 @@ from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.load import Edits, ModelLike, load_model
 from mjcartpole.studies.evaluation import EPISODES, SEED, Evaluation, check_count, evaluate
 from mjcartpole.studies.statistics import Interval, bootstrap_interval
-from mjcartpole.task import CARTPOLE_V1, Task
+from mjcartpole.task import CARTPOLE_V1, Task, resolve
 
 GYM: Final = "gym"
 """The place that is gymnasium's own CartPole-v1, instead of a model."""
@@ -166,6 +166,7 @@ def transfer(
     policies: Mapping[str, Policy | Sequence[Policy]],
     places: Sequence[Place | ModelLike],
     *,
+    task: Task | str = CARTPOLE_V1,
     episodes: int = EPISODES,
     seed: int = SEED,
     workers: int | None = None,
@@ -178,6 +179,7 @@ def transfer(
     Args:
         policies: By name; several under one name are one learner's, from several seeds.
         places: Places, or what `find_place` takes.
+        task: The rules, or their name.
         episodes: Greedy episodes per cell.
         seed: Seeds the starting states and the bootstrap.
         workers: How many cells at once; as many as there are cores if left out.
@@ -199,27 +201,25 @@ def transfer(
     for name, place in pairs:
         for policy in groups[name]:
             policy.check_fits(place.poles, place.name)
-    with _pool(workers, len(pairs)) as pool:
+    rules, count = resolve(task), worker_count(workers, len(pairs))
+    # Threads: the compiled engine leaves Python's lock alone.
+    with concurrent.futures.ThreadPoolExecutor(count) as pool:
         futures = [
-            pool.submit(_play, name, groups[name], place, episodes, seed) for name, place in pairs
+            pool.submit(_play, name, groups[name], place, rules, episodes, seed)
+            for name, place in pairs
         ]
         try:
             cells = tuple(future.result() for future in futures)
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             raise
-    return TransferResult(tuple(policies), tuple(place.name for place in found), cells, seed)
+    names = tuple(place.name for place in found)
+    return TransferResult(tuple(policies), names, cells, seed, rules)
 
 
-def _pool(workers: int | None, jobs: int) -> concurrent.futures.ThreadPoolExecutor:
-    """Threads: the compiled engine leaves Python's lock alone."""
-    if workers is not None and workers < 1:
-        raise ConfigError(f"workers must be a whole number from 1 up, not {workers}")
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-    return concurrent.futures.ThreadPoolExecutor(min(workers or cores or 1, jobs))
-
-
-def _play(name: str, policies: Sequence[Policy], place: Place, episodes: int, seed: int) -> Cell:
+def _play(
+    name: str, policies: Sequence[Policy], place: Place, rules: Task, episodes: int, seed: int
+) -> Cell:
     try:
         played = [
             evaluate(
@@ -227,6 +227,7 @@ def _play(name: str, policies: Sequence[Policy], place: Place, episodes: int, se
                 backend=place.backend,
                 model=place.cartpole or "cartpole",
                 integrator=place.integrator,
+                task=rules,
                 episodes=episodes,
                 seed=seed,
             )

@@ -1,13 +1,13 @@
 """Rung 8: the same learner on both backends, and whether it comes to the same."""
 
 import multiprocessing
-import os
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 from scipy import stats
 
+from mjcartpole.cores import worker_count
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.loop import play_episode
 from mjcartpole.learning.training import Training
@@ -107,7 +107,7 @@ def _interval(differences: Vector) -> tuple[Vector, Vector]:
 
 
 def _run_all(jobs: list[_Job], quick: bool) -> list[list[list[float]]]:
-    workers = 1 if quick else min(os.cpu_count() or 1, len(jobs))
+    workers = worker_count(1 if quick else None, len(jobs))
     if workers == 1:
         return [_run_one(job) for job in jobs]
     # A fresh interpreter each: nothing of OpenGL or threads is inherited.
