@@ -11,8 +11,9 @@ from mjcartpole.commands.train_shared import about, changes, check, go_on, prepa
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.signals import Interrupted, StopSignals
 from mjcartpole.studies import multi_seed_runs
-from mjcartpole.studies.multi_seed import SeedRunner, check_seeds
+from mjcartpole.studies.multi_seed import SeedRunner
 from mjcartpole.studies.multi_seed_runs import ManyBegun
+from mjcartpole.studies.seeds import check_seeds
 
 
 def train(config: TrainConfig, how: TrainOptions, where: RunLocation, seeds: int) -> int:
