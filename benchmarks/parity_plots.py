@@ -20,7 +20,7 @@ from mjcartpole.physics import linear
 from mjcartpole.physics.load import load_model
 from mjcartpole.studies.parity import Subject
 from mjcartpole.studies.parity.convergence import METHODS, energy_track
-from mjcartpole.studies.parity.dynamics import EPS
+from mjcartpole.studies.parity.rounding import EPS
 from mjcartpole.studies.parity.trajectories import error_growth
 
 MEASURED, BOUND = (css(colour) for colour in CURVES[:2])

@@ -20,7 +20,8 @@ from mjcartpole.studies.parity import RUNGS, Figure, Result, Subject, run_ladder
 from mjcartpole.studies.parity.case import Batch, set_parameters, why_not_gymnasiums
 from mjcartpole.studies.parity.convergence import _order_figures
 from mjcartpole.studies.parity.diagnosis import likely_cause
-from mjcartpole.studies.parity.dynamics import EPS, gym_steps, step_gym
+from mjcartpole.studies.parity.dynamics import gym_steps, step_gym
+from mjcartpole.studies.parity.rounding import EPS
 from mjcartpole.studies.parity.trajectories import predicted_growth
 
 REFERENCE = load_model("cartpole").xml

@@ -64,7 +64,7 @@ class Rollout:
     """One episode as it was played.
 
     Attributes:
-        stage: Who played, and where.
+        setup: Who played, and where.
         episode: What it came to.
         states: From the first to the last, one row each, shape (steps + 1, 4) with one pole.
     """

@@ -1,4 +1,4 @@
-"""What a handful of seeds can tell: robust averages, and how far to trust them.
+"""Statistics: robust averages over a handful of seeds, and how far to trust them.
 
 After Agarwal et al. 2021, "Deep Reinforcement Learning at the Edge of the Statistical Precipice"
 (arXiv:2108.13264); the definitions are those of its library, rliable, so that figures can be held
@@ -58,7 +58,7 @@ class Aggregate:
     solved: float | None
 
     def summary(self) -> dict[str, Any]:
-        """The figures as plain values, for JSON."""
+        """Return the figures as plain values, for JSON."""
         return {
             "count": self.count,
             "mean": self.mean,
@@ -92,13 +92,13 @@ def aggregate(scores: npt.ArrayLike, *, solved_at: float | None, seed: int = 0) 
         iqm=iqm(values),
         interval=bootstrap_interval(values, seed=seed),
         minimum=float(values.min()),
-        solved_at=solved_at,
+        solved_at=None if solved_at is None else float(solved_at),
         solved=None if solved_at is None else float((values >= solved_at).mean()),
     )
 
 
 def iqm(scores: npt.ArrayLike) -> float:
-    """Interquartile mean: what is left of the pooled scores without a quarter at either end.
+    """Return the interquartile mean: of the pooled scores without a quarter at either end.
 
     With k scores in all, the lowest and the highest int(k / 4) are dropped, whole scores only: 4
     to 7 scores lose one at each end, fewer lose none. rliable does so (`scipy.stats.trim_mean`);
@@ -124,7 +124,7 @@ def bootstrap_interval(
     resamples: int = RESAMPLES,
     seed: int = 0,
 ) -> Interval:
-    """Percentile interval of a statistic by the stratified bootstrap.
+    """Return the percentile interval of a statistic by the stratified bootstrap.
 
     Runs are drawn with replacement within each task, independently of the other tasks: which runs
     were lucky varies, which tasks are hard does not. With one task it is the plain bootstrap.
@@ -150,16 +150,14 @@ def bootstrap_interval(
 
 
 def probability_of_improvement(x: npt.ArrayLike, y: npt.ArrayLike) -> float:
-    """How likely a run of X scores higher than a run of Y on the same task, averaged over tasks.
+    """Return how likely a run of X scores higher than one of Y on the same task, over all tasks.
 
-    P(X > Y) + P(X = Y) / 2 over all pairs of runs: the Mann-Whitney U divided by n_x n_y.
+    P(X > Y) + P(X = Y) / 2 over all pairs of runs: the Mann-Whitney U divided by n_x n_y; 0.5 says
+    that neither is ahead.
 
     Args:
         x: Scores of X, shape (n_x,) or (n_x, m).
         y: Scores of Y, shape (n_y,) or (n_y, m).
-
-    Returns:
-        0 to 1; 0.5 says that neither is ahead.
 
     Raises:
         ConfigError: Scores are empty, not finite, or of shapes that do not fit.
@@ -175,27 +173,19 @@ def improvement_interval(
     resamples: int = RESAMPLES,
     seed: int = 0,
 ) -> Interval:
-    """Percentile interval of `probability_of_improvement` by the stratified bootstrap.
+    """Return the interval of `probability_of_improvement`, as `bootstrap_interval` finds one.
 
-    X and Y are drawn independently of each other, each as in `bootstrap_interval`.
-
-    Args:
-        x: Scores of X, shape (n_x,) or (n_x, m).
-        y: Scores of Y, shape (n_y,) or (n_y, m).
-        confidence: Between 0 and 1, both excluded.
-        resamples: How often to draw, at least 1.
-        seed: The same seed gives the same interval.
+    X and Y are drawn independently of each other.
 
     Raises:
-        ConfigError: Scores are empty, not finite, or of shapes that do not fit, or a setting makes
-            no sense.
+        ConfigError: See both.
     """
     pairs = _resample(*_checked_pair(x, y), times=resamples, seed=seed)
     return _percentiles((_improvement(*pair) for pair in pairs), confidence)
 
 
 def _improvement(x: Array, y: Array) -> float:
-    """`probability_of_improvement` of checked scores."""
+    """Return the `probability_of_improvement` of checked scores."""
     # Two for a win and one for a tie, found by bisection: with many runs all pairs take longer.
     points = 0
     for task_x, task_y in zip(np.atleast_2d(x.T), np.atleast_2d(y.T), strict=True):
@@ -208,7 +198,7 @@ def _improvement(x: Array, y: Array) -> float:
 
 
 def _resample(*groups: Array, times: int, seed: int) -> Iterator[tuple[Array, ...]]:
-    """Each group drawn anew within its tasks, `times` over."""
+    """Yield each group drawn anew within its tasks, `times` over."""
     if times < 1:
         raise ConfigError(f"resamples must be a whole number from 1 up, not {times}")
     if seed < 0:
@@ -222,7 +212,7 @@ def _resample(*groups: Array, times: int, seed: int) -> Iterator[tuple[Array, ..
 
 
 def _percentiles(draws: Iterator[float], confidence: float) -> Interval:
-    """The middle share of draws, by numpy's linear interpolation between two of them."""
+    """Return the middle share of draws, by numpy's linear interpolation between two of them."""
     if not 0 < confidence < 1:
         raise ConfigError(f"confidence must lie between 0 and 1, both excluded, not {confidence}")
     values = np.fromiter(draws, np.float64)
@@ -234,7 +224,7 @@ def _percentiles(draws: Iterator[float], confidence: float) -> Interval:
 
 
 def _checked(scores: npt.ArrayLike, name: str = "scores") -> Array:
-    """Scores as an array, or the reason why not.
+    """Return scores as an array.
 
     Raises:
         ConfigError: They are no numbers, empty, not finite, or not of shape (n,) or (n, m).
@@ -258,7 +248,7 @@ def _checked(scores: npt.ArrayLike, name: str = "scores") -> Array:
 
 
 def _checked_pair(x: npt.ArrayLike, y: npt.ArrayLike) -> tuple[Array, Array]:
-    """Two sets of scores on the same tasks.
+    """Return two sets of scores on the same tasks.
 
     Raises:
         ConfigError: One is not usable, or they have not the same tasks.

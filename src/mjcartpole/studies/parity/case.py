@@ -1,4 +1,4 @@
-"""The model under examination, and what it is held against."""
+"""Cases: the model under examination, and what it is held against."""
 
 import dataclasses
 from dataclasses import dataclass
@@ -105,6 +105,14 @@ class Subject:
         """Why one step of the file's own integrator is not what it is held against."""
         return beyond_step(self.cartpole, self.method)
 
+    def uncovered(self, integrator: Integrator = "gym") -> list[str]:
+        """Return why the equations cannot answer for the model, asked about itself."""
+        return self.acting(integrator) if self.against == "itself" else []
+
+    def acting(self, integrator: Integrator) -> list[str]:
+        """Return what acts in a step of an integrator and is not in the equations."""
+        return self.beyond + (self.beyond_step if integrator == "mujoco" else [])
+
     @cached_property
     def deviations(self) -> list[Deviation]:
         """By what the model's parameters differ from the reference's."""
@@ -132,11 +140,11 @@ class Subject:
         return farthest_from_origin(self.cartpole)
 
     def rng(self, rung: int) -> np.random.Generator:
-        """A rung's own generator, so that rungs can be run alone with the same result."""
+        """Return a rung's own generator, so that rungs can be run alone with the same result."""
         return np.random.default_rng([self.seed, rung])
 
     def simulation(self, integrator: Integrator) -> Simulation:
-        """The model in motion; asked about itself, with dry friction solved to the end."""
+        """Return the model in motion; asked about itself, with dry friction solved to the end."""
         simulation = Simulation(self.cartpole, integrator)
         if self.solves_to_the_end:
             simulation.model.opt.tolerance = 0.0
@@ -152,12 +160,12 @@ class Subject:
         return self.against == "itself" and rubs is not None
 
     def ours(self, integrator: Integrator = "gym", **options: Any) -> gymnasium.Env[Any, Any]:  # noqa: ANN401
-        """Our environment with this model."""
+        """Return our environment with this model."""
         arguments = {"model": self.cartpole, "integrator": integrator, **options}
         return gymnasium.make(ENV_ID, disable_env_checker=True, **arguments)
 
     def gyms(self, integrator: Integrator = "gym", **options: Any) -> gymnasium.Env[Any, Any]:  # noqa: ANN401
-        """Gymnasium's environment with the reference's parameters.
+        """Return gymnasium's environment with the reference's parameters.
 
         Raises:
             ValueError: Its formula cannot express them; see `gym_cannot`.
@@ -168,7 +176,7 @@ class Subject:
         return env
 
     def gyms_as_is(self) -> gymnasium.Env[Any, Any]:
-        """Gymnasium's environment with nothing changed."""
+        """Return gymnasium's environment with nothing changed."""
         return gymnasium.make(GYM_ID, disable_env_checker=True)
 
     @cached_property
@@ -187,7 +195,7 @@ class Subject:
         return training.result().policy
 
     def random_batch(self, rung: int, n: int, box: npt.ArrayLike) -> Batch:
-        """N random states within ±box, and actions."""
+        """Return n random states within ±box, and actions."""
         rng, (low, high) = self.rng(rung), self.region.box(box)
         states, actions = rng.uniform(low, high, size=(n, 4)), rng.integers(2, size=n)
         if not self.region.bounds:
@@ -196,16 +204,16 @@ class Subject:
         return Batch(states[stays], actions[stays])
 
     def forces(self, batch: Batch) -> Vector:
-        """The reference's push for each action of a batch, N."""
+        """Return the reference's push for each action of a batch, N."""
         return np.array(self.reference.forces)[batch.actions]
 
     def controls(self, batch: Batch) -> Vector:
-        """The model's control for each action of a batch."""
+        """Return the model's control for each action of a batch."""
         return np.array(self.cartpole.controls)[batch.actions]
 
 
 def why_not_gymnasiums(p: Parameters) -> str:
-    """Why gymnasium's formula cannot express a cart-pole; empty if it can."""
+    """Return why gymnasium's formula cannot express a cart-pole; empty if it can."""
     uniform = p.pole_mass * p.com_distance**2 / 3
     if abs(p.inertia - uniform) > 1e-12 * uniform or p.com_distance <= 0:
         return "its pole is a uniform thin rod, and this one is not"

@@ -12,8 +12,13 @@ from mjcartpole.physics.equations import coefficients
 from mjcartpole.physics.free_region import FreeRegion
 from mjcartpole.physics.simulation import Simulation
 from mjcartpole.studies.parity.case import Subject, Vector
-from mjcartpole.studies.parity.dynamics import beyond_result
-from mjcartpole.studies.parity.result import Figure, Result
+from mjcartpole.studies.parity.result import Figure, Question, Result
+
+QUESTION = Question(
+    9,
+    "convergence: each integrator against DOP853, and its energy",
+    "theory: halving the step halves Euler's error (order 1) and makes RK4's 16 times less",
+)
 
 METHODS: dict[str, tuple[Integrator, str, int]] = {
     "explicit Euler": ("gym", "Euler", 1),
@@ -42,13 +47,12 @@ ENERGY_SECONDS = 10.0
 
 def convergence(subject: Subject) -> Result:
     """Rung 9: measured order against SciPy's DOP853 on the equations; energy gained or lost."""
-    title = "convergence: each integrator against DOP853, and its energy"
-    reason = "theory: halving the step halves Euler's error (order 1) and makes RK4's 16 times less"
-    if subject.against == "itself" and subject.beyond:
-        return beyond_result(9, title, reason, subject.beyond)
+    if uncovered := subject.uncovered():
+        return QUESTION.leave(uncovered)
     if subject.reference.slider_friction or subject.reference.hinge_friction:
-        why = "dry friction jumps where the motion turns: no method keeps its order across that"
-        return Result(9, title, reason, skipped=why)
+        return QUESTION.skip(
+            "dry friction jumps where the motion turns: no method keeps its order across that"
+        )
     duration, exact = _exact(subject)
     figures: list[Figure] = []
     for name, (integrator, option, order) in METHODS.items():
@@ -62,11 +66,11 @@ def convergence(subject: Subject) -> Result:
                 Figure(f"{name}: energy gained in {ENERGY_SECONDS:g} s", gain, None, "m g l")
             )
     bad = any(not figure.holds for figure in figures)
-    return Result(9, title, reason, tuple(figures), (), subject.story if bad else ())
+    return QUESTION.answer(figures, story=subject.story if bad else ())
 
 
 def _order_figures(name: str, order: int, errors: list[float]) -> list[Figure]:
-    """How far a measured order is from theory's, or that rounding hides it."""
+    """Return how far a measured order is from theory's, or that rounding hides it."""
     usable = [error for error in errors if error >= ROUNDING]
     if len(usable) < 2:
         # It cannot fall faster than its order lets it.
@@ -81,7 +85,7 @@ def _order_figures(name: str, order: int, errors: list[float]) -> list[Figure]:
 
 
 def _start(subject: Subject) -> Vector:
-    """A state at rest in none of its values, from which no stop is reached."""
+    """Return a state at rest in none of its values, from which no stop is reached."""
     region = subject.region
     room = min(-region.theta[0], region.theta[1]) / abs(START[2])
     along = min(-region.x[0], region.x[1]) / abs(START[1])
@@ -90,7 +94,7 @@ def _start(subject: Subject) -> Vector:
 
 
 def _duration(subject: Subject) -> float:
-    """A time in which the pole moves well but does not spin, s: set by weight, push and brakes."""
+    """Return a time, s, in which the pole moves well but does not spin, by weight, push, brakes."""
     p, k = subject.reference, coefficients(subject.reference)
     _, falling = equations.accelerations(p, 0.0, 1.0, 0.0, 0.0)
     _, pushed = equations.accelerations(p, 0.0, START[2], START[3], p.forces[1])
@@ -102,7 +106,7 @@ def _duration(subject: Subject) -> float:
 
 
 def _exact(subject: Subject) -> tuple[float, Vector]:
-    """A time within which no stop is reached, s, and the state after it."""
+    """Return a time within which no stop is reached, s, and the state after it."""
     p, force, duration = subject.reference, subject.reference.forces[1], _duration(subject)
     while True:
         solution = solve_ivp(
@@ -121,7 +125,7 @@ def _exact(subject: Subject) -> tuple[float, Vector]:
 def _errors(
     subject: Subject, integrator: Integrator, option: str, duration: float, exact: Vector
 ) -> list[float]:
-    """The error at the end with steps that are halved again and again, until rounding shows."""
+    """Return the error at the end with steps that are halved until rounding shows."""
     errors: list[float] = []
     for halving in range(COARSEST, FINEST):
         count = 2**halving
@@ -137,7 +141,7 @@ def _errors(
 
 
 def energy_gain(subject: Subject, integrator: Integrator, option: str) -> float:
-    """Energy gained by a free swing at the model's own timestep, over m g l.
+    """Return the energy gained by a free swing at the model's own timestep, over m g l.
 
     Infinite where the swing diverges, as explicit Euler's does with strong damping.
     """
@@ -148,7 +152,7 @@ def energy_gain(subject: Subject, integrator: Integrator, option: str) -> float:
 
 
 def energy_track(subject: Subject, integrator: Integrator, option: str) -> Vector:
-    """Energy after each step of a free swing that starts hanging aside, J."""
+    """Return the energy after each step of a free swing that starts hanging aside, J."""
     cartpole = with_options(subject.cartpole, timestep=subject.cartpole.timestep, integrator=option)
     simulation = Simulation(cartpole, integrator)
     simulation.state = [0.0, 0.0, np.pi - 0.5, 0.0]

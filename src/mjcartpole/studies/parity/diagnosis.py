@@ -1,4 +1,4 @@
-"""What would explain an error that was measured?
+"""Diagnosis: what would explain an error that was measured.
 
 Each thing by which the model differs from the reference is tried alone: the equations with that one
 change predict an error, and the share of the measured error that it explains is compared. What lies
@@ -34,7 +34,7 @@ class _Candidate(NamedTuple):
 def likely_cause(
     subject: Subject, predict: Predict, found: Vector, beyond: Iterable[str] | None = None
 ) -> str:
-    """What best explains a wrong answer, in words; the fewest changes that explain most of it.
+    """Return what best explains a wrong answer, in words: the fewest changes that do.
 
     Args:
         subject: What is examined.
@@ -71,7 +71,7 @@ def likely_cause(
 def _candidates(
     subject: Subject, predict: Predict, base: Vector, found: Vector, left_out: str
 ) -> Iterator[_Candidate]:
-    """Each deviation alone, each parameter alone, and what the equations leave out."""
+    """Yield each deviation alone, each parameter alone, and what the equations leave out."""
     own, reference = subject.own, subject.reference
     for deviation in subject.deviations:
         changed = take(reference, own, deviation.fields)
@@ -81,7 +81,7 @@ def _candidates(
 
 
 def _fewest(subject: Subject, predict: Predict, share: Callable[[Vector], float]) -> list[str]:
-    """The deviations that explain enough together, the one that adds most first."""
+    """Return the deviations that explain enough together, the one that adds most first."""
     own, reference = subject.own, subject.reference
     left, chosen, fields = list(subject.deviations), [], frozenset[str]()
     while left:
@@ -97,7 +97,7 @@ def _fewest(subject: Subject, predict: Predict, share: Callable[[Vector], float]
 def _fitted(
     reference: Parameters, predict: Predict, base: Vector, error: Vector
 ) -> Iterator[_Candidate]:
-    """The reference with one parameter at a time moved by least squares."""
+    """Yield the reference with one parameter at a time moved by least squares."""
     for name in ("cart_mass", "pole_mass", "com_distance", "inertia", "gravity", "timestep"):
         value = getattr(reference, name)
         nudged = dataclasses.replace(reference, **{name: value * (1 + _NUDGE)})

@@ -7,12 +7,15 @@ import numpy as np
 
 from mjcartpole.physics.simulation import Simulation
 from mjcartpole.studies.parity.case import Subject
-from mjcartpole.studies.parity.result import Figure, Result
+from mjcartpole.studies.parity.result import Figure, Question, Result
 from mjcartpole.versions import version_of
 
-TITLE = "third witness: dm_control steps the same document"
+QUESTION = Question(
+    10,
+    "third witness: dm_control steps the same document",
+    "the same engine on the same document: not one bit may differ",
+)
 EPISODES, STEPS, FAR = 40, 50, 1e3
-REASON = "the same engine on the same document: not one bit may differ"
 
 
 def dm_control(subject: Subject) -> Result:
@@ -25,11 +28,10 @@ def dm_control(subject: Subject) -> Result:
             from dm_control import mujoco  # noqa: PLC0415
             from dm_control.rl import control  # noqa: PLC0415
     except Exception as error:
-        why = f"dm_control does not load: {type(error).__name__}: {error}"
-        return Result(10, TITLE, REASON, skipped=" ".join(why.split()))
+        return QUESTION.skip(f"dm_control does not load: {type(error).__name__}: {error}")
     if any(subject.cartpole.upright):
         why = "the document counts the pole's angle from elsewhere, so that bits cannot be equal"
-        return Result(10, TITLE, REASON, skipped=why)
+        return QUESTION.skip(why)
     try:
         physics = mujoco.Physics.from_xml_string(subject.cartpole.xml)
     except Exception as error:
@@ -37,18 +39,17 @@ def dm_control(subject: Subject) -> Result:
         names = "dm-control", "mujoco"
         versions = " with ".join(f"{name} {version_of(name)}" for name in names)
         why = f"{versions} does not load this document: {type(error).__name__}: {error}"
-        return Result(10, TITLE, REASON, skipped=" ".join(why.split()))
+        return QUESTION.skip(why)
     try:
         different, compared = _count_differences(subject, physics)
     except (ValueError, control.PhysicsError) as error:
-        why = f"dm_control does not step this document: {error}"
-        return Result(10, TITLE, REASON, skipped=" ".join(why.split()))
+        return QUESTION.skip(f"dm_control does not step this document: {error}")
     figures = (Figure(f"steps that differ ({compared:,})", float(different), 0.0),)
-    return Result(10, TITLE, REASON, figures)
+    return QUESTION.answer(figures)
 
 
 def _count_differences(subject: Subject, physics: Any) -> tuple[int, int]:  # noqa: ANN401
-    """How many steps end at other bits, and of how many."""
+    """Return how many steps end at other bits, and of how many."""
     physics.legacy_step = False
     simulation = Simulation(subject.cartpole, "mujoco")
     order = list(subject.cartpole.joints)

@@ -9,7 +9,11 @@ from mjcartpole import task
 from mjcartpole.envs.backend import GYM_ID
 from mjcartpole.envs.registration import ENV_ID
 from mjcartpole.studies.parity.case import Subject
-from mjcartpole.studies.parity.result import Figure, Result
+from mjcartpole.studies.parity.result import Figure, Question, Result
+
+QUESTION = Question(
+    1, "interface: spaces, metadata, registration, first observations", "equal by definition"
+)
 
 BOUNDS: tuple[dict[str, float], ...] = (
     {},
@@ -33,8 +37,7 @@ def interface(subject: Subject) -> Result:
         Figure("declarations that differ", float(len(problems)), 0.0),
         Figure(f"first observations that differ ({seeds * len(BOUNDS):,})", float(different), 0.0),
     )
-    title = "interface: spaces, metadata, registration, first observations"
-    return Result(1, title, "equal by definition", figures, problems)
+    return QUESTION.answer(figures, problems=tuple(problems))
 
 
 def _declarations(
@@ -47,17 +50,17 @@ def _declarations(
         "action_space": (ours.action_space, gyms.action_space),
         "metadata": (ours.metadata, metadata),
     }
-    return [f"{name} {a} instead of {b}" for name, (a, b) in pairs.items() if a != b]
+    return _unequal(pairs)
 
 
 def _registration() -> list[str]:
     ours, gyms = gymnasium.spec(ENV_ID), gymnasium.spec(GYM_ID)
-    found = []
-    for name in ("max_episode_steps", "reward_threshold", "nondeterministic", "order_enforce"):
-        a, b = getattr(ours, name), getattr(gyms, name)
-        if a != b:
-            found.append(f"{name} {a} instead of {b}")
-    return found
+    names = ("max_episode_steps", "reward_threshold", "nondeterministic", "order_enforce")
+    return _unequal({name: (getattr(ours, name), getattr(gyms, name)) for name in names})
+
+
+def _unequal(pairs: dict[str, tuple[Any, Any]]) -> list[str]:
+    return [f"{name} {a} instead of {b}" for name, (a, b) in pairs.items() if a != b]
 
 
 def _same_reset(

@@ -1,6 +1,7 @@
 """Rung 8: the same learner on both backends, and whether it comes to the same."""
 
 import multiprocessing
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
@@ -13,8 +14,7 @@ from mjcartpole.learning.loop import play_episode
 from mjcartpole.learning.training import Training
 from mjcartpole.studies.evaluation import SEED
 from mjcartpole.studies.parity.case import Subject, Vector
-from mjcartpole.studies.parity.dynamics import beyond_result
-from mjcartpole.studies.parity.result import Figure, Result
+from mjcartpole.studies.parity.result import Figure, Question, Result
 
 SEEDS: Final = 20
 BLOCKS: Final = 10
@@ -27,6 +27,13 @@ MARGINS: Final = {"mean": 25.0, "block": 75.0, "greedy": 50.0}
 """Differences in return, of 500, that nobody would act on: 5 % for the mean of the whole curve,
 10 % for the final greedy return, and 15 % for a block of the curve, since in the middle of learning
 seeds differ by so much that 20 of them cannot tell less."""
+
+PARTS: Final[dict[str, Callable[[Vector], Vector]]] = {
+    "mean": lambda rows: rows[:, :-1].mean(axis=1, keepdims=True),
+    "block": lambda rows: rows[:, :-1],
+    "greedy": lambda rows: rows[:, -1:],
+}
+"""What is compared of each seed's row: the blocks of its curve and, last, the greedy return."""
 
 SPREAD_FACTOR: Final = 1.5
 """A model that is asked about itself may learn as it likes: there a margin is at least this many
@@ -43,7 +50,6 @@ class _Job:
 
 def learning(subject: Subject) -> Result:
     """Rung 8: equivalence of the return curves and of the final greedy return."""
-    title = "learning: the same learner on both backends"
     margins = ", ".join(f"{name} ±{margin:g}" for name, margin in MARGINS.items())
     reason = (
         f"equivalence, not mere lack of difference: the {CONFIDENCE:.0%} interval of the mean "
@@ -52,31 +58,23 @@ def learning(subject: Subject) -> Result:
     )
     if subject.against == "itself":
         reason += f", or {SPREAD_FACTOR:g} standard deviations between seeds"
-        if subject.beyond:
-            return beyond_result(8, title, reason, subject.beyond)
+    question = Question(8, "learning: the same learner on both backends", reason)
+    if uncovered := subject.uncovered():
+        return question.leave(uncovered)
     if subject.gym_cannot:
-        why = f"gymnasium cannot play this cart-pole: {subject.gym_cannot}"
-        return Result(8, title, reason, skipped=why)
+        return question.skip(f"gymnasium cannot play this cart-pole: {subject.gym_cannot}")
     episodes, evaluations = (40, 3) if subject.quick else (1_000, 30)
     jobs = [_Job(subject, seed, episodes, evaluations) for seed in range(SEEDS)]
     rows = np.array(_run_all(jobs, subject.quick))
     figures = _figures(rows[:, 0], rows[:, 1], relaxed=subject.against == "itself")
-    return Result(8, title, reason, figures)
+    return question.answer(figures)
 
 
 def _figures(ours: Vector, gyms: Vector, *, relaxed: bool) -> tuple[Figure, ...]:
-    """What is compared: columns are the blocks of the curve and, last, the greedy return."""
+    """Return how far the rows of both backends are apart."""
     figures = []
-    parts = {
-        "mean": (
-            ours[:, :-1].mean(axis=1, keepdims=True),
-            gyms[:, :-1].mean(axis=1, keepdims=True),
-        ),
-        "block": (ours[:, :-1], gyms[:, :-1]),
-        "greedy": (ours[:, -1:], gyms[:, -1:]),
-    }
-    for name, (a, b) in parts.items():
-        low, high = _interval(a - b)
+    for name, part in PARTS.items():
+        low, high = _interval(part(ours) - part(gyms))
         # An interval lies within ±margin if the end that is further from zero does.
         furthest = np.maximum(np.abs(low), np.abs(high))
         worst = int(furthest.argmax())
@@ -96,7 +94,7 @@ def _figures(ours: Vector, gyms: Vector, *, relaxed: bool) -> tuple[Figure, ...]
 
 
 def _interval(differences: Vector) -> tuple[Vector, Vector]:
-    """Student's interval of the mean of each column, shape (columns,) twice.
+    """Return Student's interval of the mean of each column, shape (columns,) twice.
 
     The seeds are paired: both backends start from the same table, draws and states.
     """
@@ -116,7 +114,7 @@ def _run_all(jobs: list[_Job], quick: bool) -> list[list[list[float]]]:
 
 
 def _run_one(job: _Job) -> list[list[float]]:
-    """Block means of the returns, and the mean greedy return, on either backend."""
+    """Return block means of the returns, and the mean greedy return, on either backend."""
     config = TrainConfig.preset("tuned", episodes=job.episodes, seed=job.seed)
     rows = []
     for env in (job.subject.ours(), job.subject.gyms()):

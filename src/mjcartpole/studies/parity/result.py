@@ -1,7 +1,8 @@
-"""What one rung of the ladder found."""
+"""Results: what one rung of the ladder found, in figures, bounds and words."""
 
 import dataclasses
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -34,7 +35,7 @@ class Figure:
         return self.value >= self.bound if self.at_least else self.value <= self.bound
 
     def as_dict(self) -> dict[str, Any]:
-        """Everything, as plain values for JSON, which knows neither NaN nor infinity."""
+        """Return everything, as plain values for JSON, which knows neither NaN nor infinity."""
         value = self.value if math.isfinite(self.value) else str(self.value)
         return {**dataclasses.asdict(self), "value": value, "holds": self.holds}
 
@@ -73,7 +74,7 @@ class Result:
         return "holds" if not self.problems and all(f.holds for f in self.figures) else "fails"
 
     def as_dict(self) -> dict[str, Any]:
-        """Everything, as plain values for JSON."""
+        """Return everything, as plain values for JSON."""
         return {
             "rung": self.rung,
             "title": self.title,
@@ -84,3 +85,24 @@ class Result:
             "story": list(self.story),
             "skipped": self.skipped,
         }
+
+
+@dataclass(frozen=True)
+class Question:
+    """What a rung asks: see the first three of a `Result`, which every answer is."""
+
+    rung: int
+    title: str
+    reason: str
+
+    def answer(self, figures: Sequence[Figure] = (), **found: Any) -> Result:  # noqa: ANN401
+        """Return what was measured, and what else a `Result` holds."""
+        return Result(self.rung, self.title, self.reason, tuple(figures), **found)
+
+    def skip(self, why: str) -> Result:
+        """Return that nothing was measured, and why, in one line."""
+        return self.answer(skipped=" ".join(why.split()))
+
+    def leave(self, beyond: Sequence[str]) -> Result:
+        """Return that nothing can be said, since the equations do not cover the model."""
+        return self.answer(skipped="the equations do not cover: " + "; ".join(beyond), beyond=True)

@@ -11,9 +11,12 @@ import numpy as np
 
 from mjcartpole.envs.backend import GYM_ID
 from mjcartpole.studies.parity.case import Subject
-from mjcartpole.studies.parity.result import Figure, Result
+from mjcartpole.studies.parity.result import Figure, Question, Result
 from mjcartpole.task import CARTPOLE_V1
 
+QUESTION = Question(
+    5, "boundaries: termination, reward, past the end, time limit", "equal by definition"
+)
 LIMITS = ((0, CARTPOLE_V1.x_limit), (2, CARTPOLE_V1.theta_limit))
 STEPS_BEYOND_THE_END = 4
 
@@ -41,18 +44,17 @@ def boundaries(subject: Subject) -> Result:
         Figure(f"outcomes that differ ({compared})", float(different), 0.0),
         Figure("steps to the time limit, difference", float(abs(ours_limit - its_limit)), 0.0),
     )
-    title = "boundaries: termination, reward, past the end, time limit"
-    return Result(5, title, "equal by definition", figures, tuple(problems))
+    return QUESTION.answer(figures, problems=tuple(problems))
 
 
 def _around(limit: float) -> Iterator[float]:
-    """Both ends of a range, and their neighbours among the floats."""
+    """Yield both ends of a range, and their neighbours among the floats."""
     for end in (limit, -limit):
         yield from (math.nextafter(end, 0.0), end, math.nextafter(end, end * math.inf))
 
 
 def _outcomes(env: gymnasium.Env[Any, Any], place: int, value: float) -> list[tuple[Any, ...]]:
-    """Reward, flags and info of a step at a limit, and of a few more; warnings counted."""
+    """Return reward, flags and info of a step at a limit, and of a few more; warnings counted."""
     state = np.zeros(4)
     state[place] = value
     cartpole: Any = env.unwrapped
@@ -67,7 +69,7 @@ def _outcomes(env: gymnasium.Env[Any, Any], place: int, value: float) -> list[tu
 
 
 def _time_limit(env: gymnasium.Env[Any, Any]) -> int:
-    """Steps until truncation, with the pole held upright."""
+    """Return the steps until truncation, with the pole held upright."""
     env.reset(seed=0)
     for step in range(1, 10 * CARTPOLE_V1.time_limit):
         env.unwrapped.state = np.zeros(4)  # type: ignore[attr-defined]

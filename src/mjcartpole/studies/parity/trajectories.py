@@ -8,12 +8,12 @@ import numpy as np
 import numpy.typing as npt
 from scipy import stats
 
-from mjcartpole.learning.episodes import ENDINGS, ending_index
+from mjcartpole.learning.episodes import ENDINGS
+from mjcartpole.learning.loop import play_episode
 from mjcartpole.physics import equations, linear
 from mjcartpole.studies.parity.case import Batch, Subject, Vector
-from mjcartpole.studies.parity.dynamics import EPS, LEAST_ARM, STEP_BOUNDS, beyond_result, step_unit
-from mjcartpole.studies.parity.result import Figure, Result
-from mjcartpole.task import CARTPOLE_V1
+from mjcartpole.studies.parity.result import Figure, Question, Result
+from mjcartpole.studies.parity.rounding import EPS, LEAST_ARM, STEP_BOUNDS, step_unit
 
 HORIZON = 400
 
@@ -28,14 +28,15 @@ SIGNIFICANCE = 1e-3
 
 def horizon(subject: Subject) -> Result:
     """Rung 6: the same pushes in both worlds; the error against eps rho^t."""
-    title = "horizon: open-loop error against its predicted growth"
-    reason = (
+    question = Question(
+        6,
+        "horizon: open-loop error against its predicted growth",
         f"each step may round by rung 3's {STEP_BOUNDS[subject.against]:.0f} ulp, and the steps "
         "that follow, linearised where they are taken, multiply that: near rest by rho each, "
-        f"up to {LARGEST_ERROR:g}"
+        f"up to {LARGEST_ERROR:g}",
     )
-    if subject.against == "itself" and subject.beyond:
-        return beyond_result(6, title, reason, subject.beyond)
+    if uncovered := subject.uncovered():
+        return question.leave(uncovered)
     runs = [error_growth(subject, seed) for seed in range(4 if subject.quick else 20)]
     ratios = []
     for run in runs:
@@ -51,7 +52,7 @@ def horizon(subject: Subject) -> Result:
         Figure("episodes", float(len(runs))),
     )
     story = () if figures[0].holds else subject.story
-    return Result(6, title, reason, figures, (), story)
+    return question.answer(figures, story=story)
 
 
 class Growth(NamedTuple):
@@ -100,10 +101,10 @@ def _goes_on(subject: Subject, state: Vector, errors: list[float]) -> bool:
 
 
 def predicted_growth(subject: Subject, steps: int) -> Vector:
-    """Bound near rest for the error after each step: what each may round, carried on, (steps,).
+    """Return the bound near rest for the error after each step, shape (steps,).
 
-    sum over k < t of |J^k| u, with J the linearised step and u the bound of one step; it grows as
-    rho^t, with rho the spectral radius of J.
+    What each step may round, carried on: sum over k < t of |J^k| u, with J the linearised step and
+    u the bound of one step; it grows as rho^t, with rho the spectral radius of J.
     """
     matrix = linear.step_matrix(subject.reference, "gym")
     power, total, bounds = np.eye(4), 0.0, np.empty(steps)
@@ -127,7 +128,7 @@ class _Reference:
             self._env.state = state.copy()
 
     def step(self, action: int) -> Vector:
-        """The state after one more step, shape (4,)."""
+        """Return the state after one more step, shape (4,)."""
         if self._env is None:
             self._state = equations.step(self._p, self._state, self._p.forces[action], "gym")
             return self._state
@@ -137,7 +138,7 @@ class _Reference:
 
 
 def _stabilising_gain(subject: Subject) -> Vector:
-    """Signs of a push that keeps the pole up for a while: towards where it leans."""
+    """Return the signs of a push that keeps the pole up for a while: towards where it leans."""
     # The pole's slower mode decides: lean plus rate over its time constant.
     p = subject.reference
     distance = max(abs(p.com_distance), LEAST_ARM)
@@ -149,16 +150,16 @@ def _stabilising_gain(subject: Subject) -> Vector:
 
 def closed_loop(subject: Subject) -> Result:
     """Rung 7: one policy in both worlds, from many starting states."""
-    title = "closed loop: one policy, both backends"
-    reason = (
+    question = Question(
+        7,
+        "closed loop: one policy, both backends",
         f"actions must be equal while the predicted error is below {UNDECIDED:g}; afterwards "
-        f"lengths and endings are compared as distributions (p ≥ {SIGNIFICANCE:g})"
+        f"lengths and endings are compared as distributions (p ≥ {SIGNIFICANCE:g})",
     )
-    if subject.against == "itself" and subject.beyond:
-        return beyond_result(7, title, reason, subject.beyond)
+    if uncovered := subject.uncovered():
+        return question.leave(uncovered)
     if subject.gym_cannot:
-        why = f"gymnasium cannot play this cart-pole: {subject.gym_cannot}"
-        return Result(7, title, reason, skipped=why)
+        return question.skip(f"gymnasium cannot play this cart-pole: {subject.gym_cannot}")
     safe = int(np.sum(predicted_growth(subject, HORIZON) < UNDECIDED))
     episodes = 40 if subject.quick else 300
     ours, gyms = (
@@ -174,33 +175,31 @@ def closed_loop(subject: Subject) -> Result:
         Figure("mean length on MuJoCo", float(np.mean(lengths[0]))),
         Figure("mean length on gymnasium", float(np.mean(lengths[1]))),
     )
-    return Result(7, title, reason, figures, (), subject.story if too_early else ())
+    return question.answer(figures, story=subject.story if too_early else ())
 
 
 Played = tuple[list[int], str]
 
 
 def _play(env: gymnasium.Env[Any, Any], subject: Subject, seed: int) -> Played:
-    """Actions of one episode, and how it ended."""
-    observation: npt.NDArray[np.float32]
-    observation, _ = env.reset(seed=seed)
+    """Return the actions of one episode, and how it ended."""
     actions: list[int] = []
-    over = terminated = False
-    while not over:
+
+    def choose(observation: npt.NDArray[np.float32]) -> int:
         actions.append(subject.policy(observation))
-        observation, _, terminated, truncated, _ = env.step(actions[-1])
-        over = terminated or truncated
-    x = float(env.unwrapped.state[0])  # type: ignore[attr-defined]
-    return actions, ENDINGS[ending_index(terminated, x, CARTPOLE_V1.x_limit)]
+        return actions[-1]
+
+    episode, _ = play_episode(env, choose, seed=seed)
+    return actions, episode.ending
 
 
 def _ks(a: list[int], b: list[int]) -> float:
-    """P of the Kolmogorov-Smirnov test that two samples come from one distribution."""
+    """Return p of the Kolmogorov-Smirnov test that two samples come from one distribution."""
     return float(stats.ks_2samp(a, b, method="asymp").pvalue)
 
 
 def _chi2(ours: list[Played], gyms: list[Played]) -> float:
-    """P of the chi-squared test that the three endings are as frequent on both sides."""
+    """Return p of the chi-squared test that the three endings are as frequent on both sides."""
     counts = np.array(
         [[sum(end == name for _, end in side) for name in ENDINGS] for side in (ours, gyms)]
     )
