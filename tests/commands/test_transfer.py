@@ -16,6 +16,7 @@ from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.runs import begin_run, write_results
 from mjcartpole.learning.training import train
 from mjcartpole.physics.load import load_model
+from mjcartpole.task import TASKS, Task, register
 
 
 @pytest.fixture(scope="module")
@@ -189,3 +190,32 @@ def test_without_matplotlib_the_tables_are_written_and_a_line_says_how_to_get_th
     assert done.stderr.splitlines()[-1] == (
         "mjcartpole: no .png: a plot needs the package matplotlib: pip install 'mjcartpole[plot]'"
     )
+
+
+@pytest.fixture
+def narrow():
+    task = Task("Narrow-test-v0", x_limit=0.5, time_limit=40)
+    yield register(task)
+    del TASKS[task.name]
+
+
+def test_the_rules_are_the_policies_own_unless_others_are_asked_for(policies, tmp_path, narrow):
+    def returns(sources, **options):
+        Transfer(
+            sources, models=["cartpole"], episodes=4, output=tmp_path, overwrite=True, **options
+        ).run()
+        return json.loads((tmp_path / "transfer.json").read_text())["cells"][0]["mean"]
+
+    folder = tmp_path / "runs" / "narrow"
+    folder.mkdir(parents=True)
+    config = TrainConfig.preset("tuned", task=narrow.name, episodes=5)
+    begin_run(folder, config, load_model(), preset="tuned")
+    write_results(folder, train(config), {})
+    assert returns([folder]) <= 40
+    assert returns(policies[:1]) > 40
+    assert returns(policies[:1], task=narrow.name) <= 40
+    with pytest.raises(ConfigError, match=r"Narrow-test-v0 and CartPole-v1; say by --task"):
+        returns([folder, policies[0]])
+    assert returns([folder, policies[0]], task="CartPole-v1") > 0
+    with pytest.raises(ConfigError, match="task 'nothing'"):
+        returns(policies[:1], task="nothing")

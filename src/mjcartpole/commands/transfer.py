@@ -14,7 +14,7 @@ from mjcartpole.learning.policy import Policy
 from mjcartpole.studies.evaluation import EPISODES, SEED
 
 if TYPE_CHECKING:
-    from mjcartpole.physics.load import ModelLike
+    from mjcartpole.studies.film import PolicySetup
 
 PolicyGroups = Mapping[str, Sequence[Policy]]
 
@@ -35,6 +35,8 @@ class Transfer(Command):
     """gym: explicit Euler, as CartPole-v1; mujoco: the integrator that the model's file names."""
     own_timestep: bool = False
     """Let a control step be one physics step of a model's file, instead of 0.02 s."""
+    task: str | None = None
+    """The rules: limits, starting states, reward, time limit; the policies' own if left out."""
     episodes: int = EPISODES
     """Greedy episodes of each policy on each model."""
     seed: int = SEED
@@ -86,7 +88,7 @@ class Transfer(Command):
             raise ConfigError(
                 f"a sweep edits one model, not {len(self.models)}; give one, or no --sweep"
             )
-        model = self.models[0] if self.models else self._own_model()
+        model = self.models[0] if self.models else self._set_up(self.sources[0]).model
         name = "sweep-" + re.sub(r"[^\w.-]+", "-", key)
         target = tables.free_table(self.output, name, self.overwrite)
         curve = sweep(policies, model, key, values, edits=self.set, **self._physics, **self._play)
@@ -102,17 +104,27 @@ class Transfer(Command):
 
     @property
     def _play(self) -> dict[str, Any]:
-        return {"episodes": self.episodes, "seed": self.seed, "workers": self.workers}
+        settings = {"episodes": self.episodes, "seed": self.seed, "workers": self.workers}
+        return {"task": self._task(), **settings}
 
-    def _own_model(self) -> "ModelLike":
-        """Return the model that the first policy was trained on."""
-        from mjcartpole.commands.policies import learned_seeds, set_up
-        from mjcartpole.studies.multi_seed_runs import is_seeds
+    def _task(self) -> str:
+        """Return by whose rules is played: those asked for, or all that the policies know."""
+        names = dict.fromkeys(self._set_up(source).task.name for source in self.sources)
+        if self.task is None and len(names) > 1:
+            raise ConfigError(
+                f"the policies were trained by the rules of {' and '.join(names)}; say by --task "
+                "which are played, so that their returns can be compared"
+            )
+        return self.task or next(iter(names))
 
-        first = self.sources[0]
-        if is_seeds(first):
-            first = next(iter(learned_seeds(first).values()))
-        return set_up(first, EvalTarget(allow_assets=self.allow_assets)).model
+    def _set_up(self, source: Path) -> "PolicySetup":
+        """Return where a policy was trained; of many seeds the first."""
+        from mjcartpole.commands.policies import set_up
+        from mjcartpole.studies.multi_seed_runs import is_seeds, learned_seeds
+
+        if is_seeds(source):
+            source = next(iter(learned_seeds(source)[0].values()))
+        return set_up(source, EvalTarget(allow_assets=self.allow_assets))
 
     def _find_policies(self) -> PolicyGroups:
         """Return policies by name, of many seeds all under one; those of one name by paths."""
@@ -126,14 +138,14 @@ class Transfer(Command):
         }
 
     def _members(self, source: Path) -> tuple[str, tuple[Policy, ...]]:
-        from mjcartpole.commands.policies import learned_seeds, set_up
+        from mjcartpole.commands.policies import learned_seeds
         from mjcartpole.learning.runs import load_run
         from mjcartpole.studies.multi_seed_runs import is_seeds
 
         if is_seeds(source):
             learned = learned_seeds(source).values()
             return source.resolve().name, tuple(load_run(run).policy for run in learned)
-        setup = set_up(source, EvalTarget(allow_assets=self.allow_assets))
+        setup = self._set_up(source)
         return setup.name, (setup.policy,)
 
 
