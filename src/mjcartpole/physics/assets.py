@@ -84,7 +84,7 @@ class Folders:
 
 def check_kind(path: Path, called: str) -> None:
     """Refuse what is there in place of a regular file."""
-    if is_there(path) and not is_file(path):
+    if not is_file(path) and is_there(path):
         kind = "a folder" if is_folder(path) else "no regular file"
         raise ModelNotFoundError(f"{called} cannot be read: '{path}' is {kind}")
 

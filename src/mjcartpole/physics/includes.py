@@ -44,9 +44,8 @@ def read_text(path: Path, name: str = "", most: int = LARGEST_FILE) -> str:
     name = name or f"model file '{path}'"
     check_kind(path, name)
     try:
-        size = path.stat().st_size
         with path.open("rb") as file:
-            content = file.read(most + 1)
+            content, size = file.read(most + 1), os.fstat(file.fileno()).st_size
     except (OSError, ValueError) as error:
         raise ModelNotFoundError(f"{name} cannot be read: {error}") from error
     if len(content) > most:
