@@ -35,9 +35,9 @@ def build(text: str, name: str, path: Path | None = None) -> CartPole:
     Raises:
         ModelError: It does not load, or is no cart-pole.
     """
-    folder, called = (path.parent, str(path)) if path else (Path(), name)
 
     def make() -> CartPole:
+        folder, called = (path.parent, str(path)) if path else (Path(), name)
         return find_parts(name, *compile_text(text, called, folder))
 
     if _NAMES_FILE.search(text):
