@@ -1,11 +1,13 @@
 """What all tests share."""
 
+import os
 import signal
 
 import pytest
 from hypothesis import HealthCheck, settings
 
 from mjcartpole.physics.simulation import silence_mujoco
+from nightly import FAST
 
 # How long an example takes says how busy the machine is, and nothing of what is tested.
 settings.register_profile("untimed", deadline=None, suppress_health_check=[HealthCheck.too_slow])
@@ -18,8 +20,10 @@ def _quiet_mujoco():
     silence_mujoco()
 
 
-def pytest_configure():
-    """Hear signals, also where the tests run in the background or under nohup: some ignored."""
+def pytest_configure(config):
+    """Say which set this is, and hear signals, which are ignored in the background or by nohup."""
+    if config.option.markexpr == "not slow":
+        os.environ[FAST] = "1"
     signal.signal(signal.SIGINT, signal.default_int_handler)
     if hasattr(signal, "SIGHUP"):
         signal.signal(signal.SIGHUP, signal.SIG_DFL)

@@ -1,25 +1,14 @@
-"""The vector of environments, against single ones and against gymnasium's own vector."""
+"""The vector of environments: its interface, its rules, and what it refuses."""
 
-import copy
 import doctest
-import gc
-import os
-import pickle
-import subprocess
-import sys
-import weakref
 
 import gymnasium
 import mujoco
 import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
-from gymnasium.wrappers.vector import RecordEpisodeStatistics
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from mjcartpole.envs import vector
-from mjcartpole.envs.cartpole import CartPoleEnv
 from mjcartpole.envs.vector import CartPoleVectorEnv
 from mjcartpole.errors import (
     ConfigError,
@@ -30,57 +19,8 @@ from mjcartpole.errors import (
     SettingError,
     SimulationError,
 )
-from mjcartpole.physics.load import load_model
 from mjcartpole.task import CARTPOLE_V1
-
-ENV_ID = "mjcartpole/CartPole-v1"
-REFERENCE = load_model("cartpole").xml
-
-
-def changed_text(*changes):
-    """The reference document with words replaced."""
-    text = REFERENCE
-    for old, new in changes:
-        assert old in text
-        text = text.replace(old, new)
-    return text
-
-
-def edited(*changes):
-    """The model of such a document."""
-    return load_model(changed_text(*changes))
-
-
-TOUCHING = (
-    ('contype="0" conaffinity="0"', 'contype="1" conaffinity="1"'),
-    # Cart and rail do not overlap, the cart and its stops do at 2.33 m.
-    ('pos="0 0.11 -0.14" size="2.68 0.05 0.04"', 'pos="0 0.11 -0.34" size="2.68 0.05 0.04"'),
-    ("2.63 0.11 -0.03", "2.56 0.11 -0.03"),
-)
-RUBBING = ('damping="0" frictionloss="0"', 'damping="0.1" frictionloss="0.05"')
-LIMITED = ('type="slide"', 'type="slide" range="-0.02 0.03"')
-MODELS = {
-    "reference": load_model("cartpole"),
-    "half steps": edited(('timestep="0.02"', 'timestep="0.01"')),
-    "rubbing, quarter steps": edited(RUBBING, ('timestep="0.02"', 'timestep="0.005"')),
-    "limited, half steps": edited(LIMITED, ('timestep="0.02"', 'timestep="0.01"')),
-    "touching": edited(*TOUCHING, ('timestep="0.02"', 'timestep="0.005"')),
-    "all at once": edited(*TOUCHING, RUBBING, LIMITED, ('timestep="0.02"', 'timestep="0.01"')),
-    "RK4": edited(('integrator="Euler"', 'integrator="RK4"')),
-    "implicit": edited(RUBBING, ('integrator="Euler"', 'integrator="implicitfast"')),
-    "sleeping": edited(
-        ('integrator="Euler"/>', 'integrator="Euler"><flag sleep="enable"/></option>')
-    ),
-}
-
-
-def run(envs, steps, seed=0):
-    """What a vector returns under actions that depend on the seed alone."""
-    generator = np.random.default_rng(seed)
-    results = [(envs.reset(seed=seed)[0],)]
-    for _ in range(steps):
-        results.append(envs.step(generator.integers(0, 2, envs.num_envs))[:4])
-    return results
+from vectors import ENV_ID, REFERENCE, TOUCHING, changed_text, run
 
 
 def test_the_specification_in_the_docstring_holds():
@@ -106,115 +46,6 @@ def test_single_environments_can_still_be_put_together():
     assert isinstance(envs, SyncVectorEnv)
     assert len(run(envs, 30)) == 31
     envs.close()
-
-
-@pytest.mark.parametrize("integrator", ["gym", "mujoco"])
-@pytest.mark.parametrize("name", MODELS)
-@settings(max_examples=6)
-@given(
-    seed=st.integers(0, 2**31),
-    threads=st.sampled_from([1, 2, None]),
-    far=st.booleans(),
-    limit=st.integers(3, 40),
-)
-def test_each_environment_is_a_single_one_bit_for_bit(name, integrator, seed, threads, far, limit):
-    n = 5
-    arguments = {"model": MODELS[name], "integrator": integrator}
-    envs = CartPoleVectorEnv(n, max_episode_steps=limit, threads=threads, **arguments)
-    singles = [CartPoleEnv(**arguments) for _ in range(n)]
-    generator = np.random.default_rng(seed)
-    envs.reset(seed=seed)
-    if far:
-        # Where the stops are, and quick enough to reach them.
-        envs.state = generator.uniform((2.1, 1, -0.1, -1), (2.3, 3, 0.1, 1), (n, 4)).T
-    ages, restarting = np.zeros(n, int), np.zeros(n, bool)
-    for single, state in zip(singles, envs.state.T, strict=True):
-        single.state = state
-    for _ in range(60):
-        actions = generator.integers(0, 2, n)
-        observations, rewards, terminations, truncations, _ = envs.step(actions)
-        for i, single in enumerate(singles):
-            if restarting[i]:
-                single.reset()
-                single.state = envs.state[:, i]
-                ages[i] = 0
-                assert (rewards[i], terminations[i], truncations[i]) == (0.0, False, False)
-                continue
-            observation, reward, terminated, _, _ = single.step(int(actions[i]))
-            ages[i] += 1
-            assert envs.state[:, i].tobytes() == single.state.tobytes()
-            assert observations[i].tobytes() == observation.tobytes()
-            assert (rewards[i], terminations[i]) == (reward, terminated)
-            assert truncations[i] == (ages[i] >= limit)
-        restarting = terminations | truncations
-
-
-def test_the_models_of_the_comparison_do_what_their_names_say():
-    """Else they would compare nothing."""
-
-    def after(name, state):
-        env = CartPoleEnv(model=MODELS[name])
-        env.state = state
-        for _ in range(3):
-            env.step(1)
-        return env.state
-
-    quick = (2.3, 2.0, 0.0, 0.0)
-    assert after("touching", quick)[0] < after("half steps", quick)[0] - 0.01
-    still = (0.0, 1.0, 0.0, 0.0)
-    assert after("limited, half steps", still)[1] < after("half steps", still)[1] - 0.1
-    assert after("rubbing, quarter steps", still)[1] < after("half steps", still)[1] - 0.001
-    assert CartPoleVectorEnv(model=MODELS["sleeping"])._simulation._batch.persistent
-
-
-@pytest.mark.parametrize("integrator", ["gym", "mujoco"])
-@pytest.mark.parametrize("name", ["reference", "all at once"])
-def test_threads_change_no_bit(name, integrator):
-    results = []
-    for threads in (1, 2, 3, None):
-        envs = CartPoleVectorEnv(
-            65, max_episode_steps=25, threads=threads, model=MODELS[name], integrator=integrator
-        )
-        run(envs, 60)
-        results.append(envs.state.tobytes())
-    assert len(set(results)) == 1
-
-
-@pytest.mark.parametrize("sutton_barto", [False, True])
-@pytest.mark.parametrize(
-    ("integrator", "kinematics"), [("gym", "euler"), ("mujoco", "semi-implicit")]
-)
-@given(seed=st.integers(0, 2**31), n=st.integers(1, 12))
-@settings(max_examples=8)
-def test_equal_to_gymnasiums_vector(sutton_barto, integrator, kinematics, seed, n):
-    arguments = {"num_envs": n, "max_episode_steps": 30, "sutton_barto_reward": sutton_barto}
-    envs = gymnasium.make_vec(ENV_ID, integrator=integrator, **arguments)
-    reference = gymnasium.make_vec("CartPole-v1", **arguments)
-    reference.unwrapped.kinematics_integrator = kinematics
-    ours, theirs = run(envs, 100, seed), run(reference, 100, seed)
-    np.testing.assert_array_equal(ours[0][0], theirs[0][0])
-    endings = 0
-    for mine, its in zip(ours[1:], theirs[1:], strict=True):
-        np.testing.assert_allclose(mine[0], its[0], rtol=0, atol=1e-6)
-        for a, b in zip(mine[1:], its[1:], strict=True):
-            np.testing.assert_array_equal(a, b)
-        assert [array.dtype for array in mine] == [array.dtype for array in its]
-        assert [array.shape for array in mine] == [array.shape for array in its]
-        endings += mine[2].sum() + mine[3].sum()
-    assert endings >= 3 * n
-    np.testing.assert_allclose(envs.state, reference.unwrapped.state, rtol=0, atol=1e-12)
-
-
-def test_a_restart_takes_gymnasiums_draws_and_ignores_the_action():
-    envs = gymnasium.make_vec(ENV_ID, num_envs=3, max_episode_steps=5)
-    reference = gymnasium.make_vec("CartPole-v1", num_envs=3, max_episode_steps=5)
-    for each in (envs, reference):
-        each.reset(seed=11)
-        for _ in range(5):
-            *_, truncations, _ = each.step(np.ones(3, dtype=int))
-        assert truncations.all()
-        each.step(np.zeros(3, dtype=int))
-    np.testing.assert_array_equal(envs.state, reference.unwrapped.state)
 
 
 @pytest.mark.parametrize("steps", [3, 5])
@@ -293,45 +124,6 @@ def test_a_mask_says_who_starts():
     assert envs.step([0, 1, 0])[1].tolist() == [1.0, 1.0, 1.0]
 
 
-COPIES = {"deepcopy": copy.deepcopy, "copy": copy.copy}
-COPIES["pickle"] = lambda envs: pickle.loads(pickle.dumps(envs))
-
-
-@pytest.mark.parametrize("how", COPIES)
-@pytest.mark.parametrize("name", ["reference", "all at once"])
-def test_a_copy_goes_on_bit_for_bit_and_by_itself(name, how):
-    envs = gymnasium.make_vec(ENV_ID, num_envs=5, max_episode_steps=20, model=MODELS[name])
-    run(envs, 33)
-    before = envs.state
-    copied = COPIES[how](envs)
-    assert (copied.spec.id, copied.num_envs) == (ENV_ID, 5)
-    actions = np.random.default_rng(1).integers(0, 2, (50, 5))
-    after = [copied.step(each)[:4] for each in actions]
-    np.testing.assert_array_equal(envs.state, before)
-    for each, results in zip(actions, after, strict=True):
-        for mine, its in zip(envs.step(each)[:4], results, strict=True):
-            assert mine.tobytes() == its.tobytes()
-    assert copied.state.tobytes() == envs.state.tobytes()
-    assert copied.reset(seed=3)[0].tobytes() == envs.reset(seed=3)[0].tobytes()
-
-
-def test_a_copy_of_what_was_drawn_draws_by_itself():
-    envs = CartPoleVectorEnv(2, render_mode="rgb_array", width=64, height=48)
-    envs.reset(seed=0)
-    pictures = envs.render()
-    copied = copy.deepcopy(envs)
-    envs.close()
-    for mine, its in zip(pictures, copied.render(), strict=True):
-        np.testing.assert_array_equal(mine, its)
-    copied.close()
-
-
-def test_a_vector_that_remembers_more_than_its_state_is_not_copied():
-    envs = CartPoleVectorEnv(2, model=MODELS["sleeping"])
-    with pytest.raises(ConfigError, match="cannot be copied"):
-        copy.deepcopy(envs)
-
-
 def test_a_start_beyond_the_limits_ends_with_the_step_after_it():
     envs = CartPoleVectorEnv(2, max_episode_steps=1)
     envs.reset(seed=0, options={"low": 1.0, "high": 1.1})
@@ -394,6 +186,8 @@ GOOD_ACTIONS = [
     [0, 1],
     (0, True),
 ]
+
+
 BAD_ACTIONS = [
     np.array([0, 2]),
     np.array([-1, 1]),
@@ -440,25 +234,6 @@ def test_a_step_needs_a_reset():
     assert envs.state is None
     with pytest.raises(ResetNeededError, match="Call reset before"):
         envs.step(np.array([0, 1]))
-
-
-def test_the_state_is_read_and_set_as_in_gymnasiums_vector():
-    envs, reference = CartPoleVectorEnv(3), gymnasium.make_vec("CartPole-v1", num_envs=3)
-    for each in (envs, reference):
-        each.reset(seed=5)
-    assert envs.state.dtype == np.float64
-    np.testing.assert_array_equal(envs.state, reference.unwrapped.state)
-    values = np.array([[0.1, 0.2, 0.03], [0.4, -0.1, 0.0], [0.01, 0.3, 0.0], [0.0, 0.0, 0.1]])
-    envs.state = values
-    expected = values.tolist()
-    values[0] = 9.0
-    assert envs.state.tolist() == expected
-    with pytest.raises(ValueError, match="read-only"):
-        envs.state[1] = 9.0
-    with pytest.raises(
-        ConfigError, match=r"states have the shape \(4, 3\).*not the shape \(3, 4\)"
-    ):
-        envs.state = np.zeros((3, 4))
 
 
 def test_a_state_set_between_steps_leaves_the_episodes_as_they_are():
@@ -563,74 +338,3 @@ def test_one_environment_is_a_vector_too():
     assert observations.shape == (1, 4)
     observations, rewards, *_ = envs.step(envs.action_space.sample())
     assert (observations.shape, rewards.shape) == ((1, 4), (1,))
-
-
-@pytest.mark.parametrize("n", [1, 7])
-def test_gymnasiums_statistics_count_the_same(n):
-    found = []
-    for name in (ENV_ID, "CartPole-v1"):
-        envs = RecordEpisodeStatistics(gymnasium.make_vec(name, num_envs=n, max_episode_steps=20))
-        run(envs, 120)
-        found.append((list(envs.return_queue), list(envs.length_queue)))
-    assert len(found[0][0]) >= 5 * n
-    assert found[0] == found[1]
-
-
-@pytest.mark.parametrize("mode", ["rgb_array", "rgb_array_list"])
-def test_one_picture_per_environment(mode):
-    envs = gymnasium.make_vec(ENV_ID, num_envs=2, render_mode=mode, width=160, height=120)
-    assert envs.render() is None
-    envs.reset(seed=0)
-    envs.unwrapped.state = [(0.0, 1.0), (0.0, 0.0), (0.0, 0.1), (0.0, 0.0)]
-    left, right = envs.render()
-    single = CartPoleEnv(render_mode="rgb_array", width=160, height=120)
-    single.state = (1.0, 0.0, 0.1, 0.0)
-    assert left.shape == (120, 160, 3)
-    assert np.abs(left.astype(int) - right).max() > 50
-    np.testing.assert_array_equal(right, single.render())
-    for each in (envs, envs, single):
-        each.close()
-
-
-def test_rendering_without_a_mode_warns():
-    envs = CartPoleVectorEnv(2)
-    envs.reset(seed=0)
-    with pytest.warns(UserWarning, match="without specifying any render mode"):
-        assert envs.render() is None
-    envs.close()
-
-
-def test_no_opengl_is_needed_whatever_the_environment_asks_for():
-    code = (
-        "import gymnasium, mjcartpole\n"
-        f"envs = gymnasium.make_vec('{ENV_ID}', num_envs=2)\n"
-        "envs.reset(seed=0)\n"
-        "print(envs.step([0, 1])[1].tolist())"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", code],
-        env={**os.environ, "MUJOCO_GL": "nonsense"},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert (done.stdout, done.stderr) == ("[1.0, 1.0]\n", "")
-
-
-@pytest.mark.parametrize("model", ["cartpole", "twopoles"])
-@pytest.mark.parametrize("make", [CartPoleEnv, CartPoleVectorEnv])
-def test_an_environment_that_nobody_holds_is_gone_at_once(make, model):
-    """Found later by the garbage collector, in a forked process, MuJoCo would wait for its threads.
-
-    They are not there, since a fork has none.
-    """
-    env = make(model=model)
-    env.reset(seed=0)
-    env.step([1] if make is CartPoleVectorEnv else 1)
-    gone = weakref.ref(env)
-    gc.disable()
-    try:
-        del env
-        assert gone() is None
-    finally:
-        gc.enable()
