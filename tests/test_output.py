@@ -41,10 +41,9 @@ def assert_complete(run):
     "where",
     [
         "| head -1",
-        "<&- >&- 2>&-",
         *(
             pytest.param(where, marks=pytest.mark.slow)
-            for where in ("| true", ">&-", "2>&-", "2>&1 | true")
+            for where in ("<&- >&- 2>&-", "| true", ">&-", "2>&-", "2>&1 | true")
         ),
     ],
 )

@@ -26,6 +26,7 @@ from mjcartpole.studies.film import Film, PolicySetup, play
 from mjcartpole.studies.transfer import transfer
 from mjcartpole.studies.video_options import VideoOptions
 from mjcartpole.task import CARTPOLE_V1
+from nightly import examples
 
 CHAIN = str(Path(__file__).parent / "models" / "chain.xml")
 BESIDE = "twopoles"
@@ -53,7 +54,7 @@ many_states = st.lists(st.floats(-1.5, 1.5), min_size=6, max_size=6)
 
 
 @given(masses, st.tuples(masses, lengths), st.tuples(masses, lengths), many_states)
-@settings(max_examples=50)
+@examples(50)
 def test_poles_beside_each_other_accelerate_as_wielands(cart, first, second, state):
     """Wieland (1991, doi:10.1109/IJCNN.1991.155416): each pole pulls the cart by itself.
 
@@ -75,7 +76,7 @@ def test_poles_beside_each_other_accelerate_as_wielands(cart, first, second, sta
 
 
 @given(masses, st.tuples(masses, lengths), st.tuples(masses, lengths), many_states)
-@settings(max_examples=50)
+@examples(50)
 def test_a_pole_on_a_pole_accelerates_as_lagrange_says(cart, lower, upper, state):
     """In the angles against the vertical, of which a hinge's own is the difference."""
     (m1, length), (m2, l2) = lower, (upper[0], upper[1] / 2)

@@ -19,6 +19,7 @@ from mjcartpole import cli
 from mjcartpole.commands.options import EvalTarget
 from mjcartpole.commands.policies import set_up
 from mjcartpole.studies.film import play
+from nightly import only
 
 SMALL = ["--size", "160x120", "--quality", "draft"]
 
@@ -147,7 +148,9 @@ def test_a_camera_follows_the_cart(runs, capsys):
     assert not np.array_equal(side[0], follow[0])
 
 
-@pytest.mark.parametrize("pair", [("mujoco", "gym"), ("article", "mujoco")])
+@pytest.mark.parametrize(
+    "pair", [("mujoco", "gym"), pytest.param(("article", "mujoco"), marks=pytest.mark.slow)]
+)
 def test_two_runs_side_by_side_start_alike(runs, pair, capsys):
     out = render([*(runs / name for name in pair)], capsys)
     path = f"videos/{pair[0]}-beside-{pair[1]}.mp4"
@@ -337,8 +340,11 @@ def wait_for_something_in(folder):
 
 
 @pytest.mark.skipif(os.name == "nt", reason="kill ends a process without a word there")
-@pytest.mark.parametrize("name", ["out.gif", "pictures"])
-@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+@pytest.mark.parametrize("name", map(only("out.gif"), ["out.gif", "pictures"]))
+@pytest.mark.parametrize(
+    ("number", "code"),
+    [(signal.SIGINT, 130), pytest.param(signal.SIGTERM, 143, marks=pytest.mark.slow)],
+)
 def test_an_interrupted_film_leaves_nothing(runs, here, name, number, code):
     pipe = subprocess.PIPE
     with start_long(runs, name, stdout=pipe, stderr=pipe, text=True) as process:
@@ -350,7 +356,10 @@ def test_an_interrupted_film_leaves_nothing(runs, here, name, number, code):
 
 
 @pytest.mark.skipif(os.name == "nt", reason="kill ends a process without a word there")
-@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+@pytest.mark.parametrize(
+    ("number", "code"),
+    [pytest.param(signal.SIGINT, 130, marks=pytest.mark.slow), (signal.SIGTERM, 143)],
+)
 def test_an_interrupted_mp4_leaves_the_old_one(runs, here, number, code):
     (here / "out").mkdir()
     (here / "out" / "out.mp4").write_bytes(b"old")

@@ -27,6 +27,7 @@ from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.run_model import MODEL
 from mjcartpole.learning.training import train
 from mjcartpole.physics.load import load_model
+from nightly import only
 
 SAME = ("policy.json", "episodes.csv", "summary.json", "config.json", "model.xml")
 """What is equal, byte for byte, in equal runs."""
@@ -153,7 +154,7 @@ def slow_reference(tmp_path_factory):
 # ------------------------------------------------------------------------------------- kills
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", map(only(0), range(3)))
 def test_a_run_that_is_killed_again_and_again_ends_as_if_it_was_not(
     seed, here, fork, slow_reference, capsys
 ):
@@ -217,8 +218,8 @@ def tree(folder):
 
 
 @EACH
-@pytest.mark.parametrize("overwrite", [False, True])
-@pytest.mark.parametrize("kind", BEGINNINGS)
+@pytest.mark.parametrize("overwrite", [False, pytest.param(True, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("kind", map(only("one"), BEGINNINGS))
 def test_a_kill_at_each_change_of_the_file_system(kind, overwrite, stride, here, fork, capsys):
     rng = random.Random(stride)
     assert call([*BEGINNINGS[kind], "--run-dir", "reference"], capsys)[0] == 0
@@ -319,7 +320,7 @@ DAMAGES = {
 }
 
 
-@pytest.mark.parametrize("damage", DAMAGES)
+@pytest.mark.parametrize("damage", map(only("cut", "noise", "empty"), DAMAGES))
 def test_a_damaged_checkpoint_is_one_line_and_a_copy_of_it_goes_on(
     damage, killed, slow_reference, capsys
 ):
@@ -479,6 +480,7 @@ def test_a_read_only_disk_is_one_line(killed):
 
 
 @pytest.mark.usefixtures("mounts")
+@pytest.mark.slow
 def test_a_small_disk_that_fills_up_is_one_line(here, slow_reference, capsys):
     (here / "disk").mkdir()
     script = (
@@ -506,7 +508,7 @@ def test_a_folder_that_cannot_be_made_is_one_line(seeds, here, capsys):
 # ----------------------------------------------------------------------------------- signals
 
 
-@pytest.mark.parametrize("engine", ["compiled", "python"])
+@pytest.mark.parametrize("engine", map(only("compiled"), ["compiled", "python"]))
 @pytest.mark.parametrize(
     ("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)], ids=["INT", "TERM"]
 )
@@ -566,6 +568,7 @@ def test_a_signal_while_evaluating_leaves_a_run_that_goes_on(here, fork, capsys)
     assert_equal_runs("run", "reference")
 
 
+@pytest.mark.slow
 def test_a_signal_while_filming_leaves_a_run_that_goes_on(here, fork, capsys):
     child = fork(["train", "--episodes", "600", "--backend", "gym", "--run-dir", "run"])
     wait_until(lambda: "run    run" in child.out, child)
@@ -813,7 +816,7 @@ def processes_here():
 
 
 @needs_proc
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM])
+@pytest.mark.parametrize("number", map(only(signal.SIGKILL), [signal.SIGKILL, signal.SIGTERM]))
 def test_the_workers_of_a_training_that_is_gone_go_as_well(number, here, capsys):
     command = ["train", "--engine", "python", "--episodes", "100000", "--seeds", "2"]
     process = subprocess.Popen(
@@ -876,7 +879,9 @@ def test_a_seed_that_is_blocked_is_named_and_goes_on_once_it_is_free(alone, caps
     assert_equal_seeds("many")
 
 
-@pytest.mark.parametrize("events", [[], ["--tensorboard"]])
+@pytest.mark.parametrize(
+    "events", [[], pytest.param(["--tensorboard"], marks=pytest.mark.slow)], ids=["plain", "events"]
+)
 def test_many_seeds_are_only_overwritten_on_request(events, alone, capsys):
     old = ["train", "--episodes", "5", "--seeds", "4", "--run-dir", "many", *events]
     assert call(old, capsys)[0] == 0
@@ -1036,6 +1041,7 @@ def test_only_a_film_of_its_own_goes_with_a_run(film, here, capsys):
     assert Path(film).read_text() == "years of work"
 
 
+@pytest.mark.slow
 def test_a_film_that_a_kill_cut_short_keeps_its_name(here, fork, capsys):
     Path("videos").mkdir()
     Path("videos/run.mp4").write_text("another's")

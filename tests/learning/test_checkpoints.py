@@ -10,7 +10,7 @@ import zipfile
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from mjcartpole.errors import CheckpointError, FileError
@@ -23,6 +23,7 @@ from mjcartpole.learning.checkpoints import (
 )
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.training import Training
+from nightly import examples, only
 
 CONFIG = TrainConfig(backend="gym", episodes=12, seed=5)
 DOCUMENT = "<mujoco/>"
@@ -122,16 +123,19 @@ def test_a_checkpoint_of_a_config_without_task_and_method_is_read(content, scrat
     assert load_checkpoint(scratch, CONFIG, DOCUMENT).episodes == 7
 
 
-def test_a_flipped_bit_is_refused_wherever_it_is(content, scratch):
-    for place in (*range(200), *range(200, len(content), 3)):
+@pytest.mark.parametrize("step", map(only(41), [3, 41]))
+def test_a_flipped_bit_is_refused_wherever_it_is(step, content, scratch):
+    for place in (*range(0, 200, 1 + step // 10), *range(200, len(content), step)):
         damaged = bytearray(content)
         damaged[place] ^= 1 << place % 8
         scratch.write_bytes(damaged)
         assert_refused(scratch)
 
 
-def test_every_length_but_the_right_one_is_refused(content, scratch):
-    for length in (*range(200), *range(200, len(content), 7), len(content) - 1):
+@pytest.mark.parametrize("step", map(only(83), [7, 83]))
+def test_every_length_but_the_right_one_is_refused(step, content, scratch):
+    lengths = (*range(0, 200, 1 + step // 20), *range(200, len(content), step), len(content) - 1)
+    for length in lengths:
         scratch.write_bytes(content[:length])
         assert_refused(scratch)
     for more in (b"\0", b"\n", b"x" * 1000, content):
@@ -141,7 +145,7 @@ def test_every_length_but_the_right_one_is_refused(content, scratch):
         assert_refused(scratch)
 
 
-@settings(max_examples=200)
+@examples(200)
 @given(data=st.data())
 def test_no_change_is_accepted(data, content, scratch):
     start = data.draw(st.integers(0, len(content)))
@@ -154,7 +158,7 @@ def test_no_change_is_accepted(data, content, scratch):
         assert_refused(scratch)
 
 
-@settings(max_examples=100)
+@examples(100)
 @given(noise=st.binary(max_size=2000))
 def test_noise_is_refused_even_with_a_right_checksum(noise, scratch):
     for start in (b"", HEAD, HEAD + hashlib.sha256(noise).hexdigest().encode() + b"\n"):

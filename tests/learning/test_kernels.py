@@ -13,7 +13,7 @@ from pathlib import Path
 import numba
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from numba.core.registry import cpu_target
 
@@ -29,8 +29,9 @@ from mjcartpole.learning.methods.experience import Trajectory, Transition
 from mjcartpole.learning.stepping import compiled
 from mjcartpole.physics import cartpole_v1
 from mjcartpole.task import minus_one_at_the_end, one_per_step
+from nightly import examples
 
-quick = settings(max_examples=200)
+quick = examples(200)
 
 
 def bits(*values):

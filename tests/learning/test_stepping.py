@@ -11,7 +11,7 @@ import mujoco
 import numba
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from mjcartpole import task
@@ -21,8 +21,9 @@ from mjcartpole.learning.discretizer import Discretizer
 from mjcartpole.physics.library import libmujoco
 from mjcartpole.physics.load import load_model
 from mjcartpole.physics.simulation import LARGEST_SANE, Simulation, check_sane
+from nightly import examples
 
-quick = settings(max_examples=200)
+quick = examples(200)
 state_values = st.floats() | st.sampled_from(
     [
         *(sign * limit for sign in (1, -1) for limit in (2.4, task.CARTPOLE_V1.theta_limit)),

@@ -124,10 +124,15 @@ def content(snapshot):
     "changes",
     [
         {"backend": "mujoco"},
-        {"backend": "gym"},
-        {"backend": "mujoco", "td_lambda": None, "ties": "random"},
         {"backend": "gym", "td_lambda": None, "ties": "random"},
-        {"integrator": "mujoco"},
+        *(
+            pytest.param(changes, marks=pytest.mark.slow)
+            for changes in (
+                {"backend": "gym"},
+                {"backend": "mujoco", "td_lambda": None, "ties": "random"},
+                {"integrator": "mujoco"},
+            )
+        ),
     ],
 )
 def test_a_training_goes_on_from_any_snapshot_with_either_engine(changes, short_chunks):

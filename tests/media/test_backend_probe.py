@@ -66,6 +66,7 @@ def test_a_display_that_is_not_there(monkeypatch):
 
 
 @LINUX
+@pytest.mark.slow
 def test_an_egl_device_that_is_not_there(monkeypatch):
     if not try_backend("egl").works:
         pytest.skip("no OpenGL by egl here")
@@ -76,6 +77,7 @@ def test_an_egl_device_that_is_not_there(monkeypatch):
 
 
 @LINUX
+@pytest.mark.slow
 def test_pyopengls_own_variable_does_not_matter(monkeypatch):
     before = try_backend("egl").works
     backend_probe.forget()

@@ -65,7 +65,7 @@ def test_it_names_versions_and_the_driver():
 @LINUX
 @pytest.mark.parametrize(
     ("there", "hidden"),
-    [("egl", "osmesa"), ("osmesa", "egl")],
+    [("egl", "osmesa"), pytest.param("osmesa", "egl", marks=pytest.mark.slow)],
     ids=["EGL only", "OSMesa only"],
 )
 def test_only_one_backend(hide, there, hidden):
@@ -88,8 +88,8 @@ def test_no_opengl_at_all(hide):
     ("wish", "said"),
     [
         ("osmesa", "osmesa (does not work here: libOSMesa.so.8"),
-        ("garbage", "garbage (names no OpenGL backend"),
-        ("glfw", "glfw (does not work here: neither DISPLAY"),
+        pytest.param("garbage", "garbage (names no OpenGL backend", marks=pytest.mark.slow),
+        pytest.param("glfw", "glfw (does not work here: neither DISPLAY", marks=pytest.mark.slow),
     ],
 )
 def test_a_misleading_wish(hide, wish, said):
@@ -110,6 +110,7 @@ def test_opengl_switched_off():
 
 
 @LINUX
+@pytest.mark.slow
 def test_a_display_that_does_not_answer():
     report = examine_with(DISPLAY=":4711")
     assert not states(report)["glfw"]

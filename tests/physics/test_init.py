@@ -17,8 +17,10 @@ print(result.steps > 0, os.environ["MUJOCO_GL"])
     "choice",
     [
         "nonsense",
-        "egl",
-        *(pytest.param(choice, marks=pytest.mark.slow) for choice in ("disable", "osmesa", "glfw")),
+        *(
+            pytest.param(choice, marks=pytest.mark.slow)
+            for choice in ("egl", "disable", "osmesa", "glfw")
+        ),
     ],
 )
 def test_training_works_with_any_mujoco_gl(choice):

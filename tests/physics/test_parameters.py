@@ -7,7 +7,7 @@ import re
 import mujoco
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from mjcartpole.errors import ModelError
@@ -23,6 +23,7 @@ from mjcartpole.physics.load import load_model, model_names
 from mjcartpole.physics.parameters import differences, read_parameters
 from mjcartpole.physics.simulation import Simulation
 from mjcartpole.physics.unmodelled_effects import beyond_equations, beyond_step
+from nightly import examples
 
 REFERENCE = load_model("cartpole").xml
 EPS = np.finfo(float).eps
@@ -153,7 +154,7 @@ poles = st.builds(
 )
 
 
-@settings(max_examples=15)
+@examples(15)
 @given(st.one_of(rods, poles))
 def test_parameters_come_back_to_the_last_digit_and_move_the_same(p):
     cartpole = build(p)

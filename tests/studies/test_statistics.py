@@ -7,7 +7,7 @@ import time
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
@@ -20,6 +20,7 @@ from mjcartpole.studies.statistics import (
     iqm,
     probability_of_improvement,
 )
+from nightly import examples
 
 number = st.floats(-1000, 1000).map(lambda value: round(value, 3))
 runs = st.lists(number, min_size=1, max_size=25)
@@ -202,7 +203,7 @@ def test_no_global_generator_is_touched():
     assert bootstrap_interval(spread(), resamples=50) == first
 
 
-@settings(max_examples=30)
+@examples(30)
 @given(runs, number, number.filter(bool))
 def test_shift_and_scale_go_through_the_interval(scores, shift, scale):
     moved = scale * np.array(scores) + shift
@@ -210,7 +211,7 @@ def test_shift_and_scale_go_through_the_interval(scores, shift, scale):
     assert bootstrap_interval(moved, resamples=50) == near((low, high), 1e-6)
 
 
-@settings(max_examples=30)
+@examples(30)
 @given(st.lists(st.floats(0, 100), min_size=1, max_size=12), number)
 def test_symmetric_scores_have_their_centre_inside(halves, centre):
     scores = np.concatenate([np.array(halves), -np.array(halves)]) + centre
@@ -258,7 +259,7 @@ def test_probabilities_of_improvement_by_hand(x, y, expected):
     assert probability_of_improvement(x, y) == pytest.approx(expected, rel=1e-15)
 
 
-@settings(max_examples=50)
+@examples(50)
 @given(few_values, few_values)
 def test_the_probability_of_improvement_is_mann_whitneys_u(x, y):
     wins = probability_of_improvement(x, y) * len(x) * len(y)
@@ -276,7 +277,7 @@ def test_the_probability_of_improvement_is_a_mean_over_tasks(n_x, n_y, m, seed):
     assert probability_of_improvement(x, y) == pytest.approx(np.mean(tasks), abs=1e-12)
 
 
-@settings(max_examples=50)
+@examples(50)
 @given(few_values, few_values)
 def test_both_sides_of_a_comparison_add_up_to_one(x, y):
     one, other = probability_of_improvement(x, y), probability_of_improvement(y, x)

@@ -6,7 +6,7 @@ import re
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from mjcartpole.errors import ConfigError, MjCartPoleError, ModelError, ModelSyntaxError
@@ -21,6 +21,7 @@ from mjcartpole.physics.edit.edits import (
 from mjcartpole.physics.load import load_model
 from mjcartpole.physics.parameters import read_parameters
 from mjcartpole.physics.unmodelled_effects import differs_from
+from nightly import examples
 
 REFERENCE = load_model("cartpole").xml
 BOB = load_model("bob").xml
@@ -153,7 +154,7 @@ def test_what_does_not_compile_is_the_loaders_error():
 KEYS = [*EDIT_NAMES, "joint:hinge.damping", "option.integrator", "geom:pole.size", "default.geom.x"]
 
 
-@settings(max_examples=200)
+@examples(200)
 @given(st.text(max_size=12) | st.sampled_from(KEYS), st.none() | st.floats() | st.text(max_size=8))
 def test_anything_gives_a_document_or_one_clear_line(key, value):
     try:

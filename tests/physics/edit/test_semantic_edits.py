@@ -6,7 +6,7 @@ import re
 import mujoco
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from mjcartpole.errors import ConfigError, ModelSyntaxError
@@ -15,6 +15,7 @@ from mjcartpole.physics.equations import Parameters
 from mjcartpole.physics.load import load_model, same_model
 from mjcartpole.physics.parameters import differences, read_parameters
 from mjcartpole.physics.unmodelled_effects import beyond_equations
+from nightly import examples
 
 REFERENCE = load_model("cartpole").xml
 BOB = load_model("bob").xml
@@ -94,7 +95,7 @@ def rod(edits):
 # --- the physics that was asked for -------------------------------------------------------------
 
 
-@settings(max_examples=40)
+@examples(40)
 @given(EDITS, st.randoms())
 def test_any_edits_in_any_order_give_the_analytic_rod(edits, random):
     at_once = edit_document(REFERENCE, edits)
@@ -110,14 +111,14 @@ def test_any_edits_in_any_order_give_the_analytic_rod(edits, random):
     assert beyond_equations(load_model(at_once, own_timestep=True)) == []
 
 
-@settings(max_examples=25)
+@examples(25)
 @given(EDITS, EDITS)
 def test_the_last_edit_decides(first, second):
     text = edit_document(edit_document(REFERENCE, first), second)
     assert differences(parameters(text), rod({**first, **second}), rtol=1e-12) == []
 
 
-@settings(max_examples=25)
+@examples(25)
 @given(EDITS)
 def test_the_pole_is_drawn_as_long_as_it_is(edits):
     text = edit_document(REFERENCE, edits)
@@ -185,7 +186,7 @@ def test_a_rod_written_with_six_digits_becomes_exact():
 # --- other models -------------------------------------------------------------------------------
 
 
-@settings(max_examples=20)
+@examples(20)
 @given(number(0.1, 10), number(0.01, 10), number(0.01, 10), number(0.1, 100))
 def test_geoms_are_scaled_where_they_decide_the_mass(length, mass, cart, force):
     edits = {"pole.length": length, "pole.mass": mass, "cart.mass": cart, "force": force}

@@ -8,10 +8,11 @@ import pytest
 
 from mjcartpole.physics.load import load_model
 from mjcartpole.studies.parity import Subject, run_ladder
+from nightly import only
 from parity_cases import POLE, WRONG, changed, climb, failures
 
 
-@pytest.mark.parametrize("height", ["0", "1e-14", "1e-9", "1e-6", "-1e-7"])
+@pytest.mark.parametrize("height", map(only("0", "1e-9"), ["0", "1e-14", "1e-9", "1e-6", "-1e-7"]))
 def test_a_pole_that_is_balanced_on_its_hinge(height):
     text = changed((POLE, POLE.replace('"0 0 0.5"', f'"0 0 {height}"')))
     subject, results = climb(text, "itself", (2, 3, 4, 6, 9))
@@ -30,7 +31,7 @@ UPS = {
 
 @pytest.mark.parametrize(
     "up",
-    [up if up in {"z down", "oblique"} else pytest.param(up, marks=pytest.mark.slow) for up in UPS],
+    [up if up == "oblique" else pytest.param(up, marks=pytest.mark.slow) for up in UPS],
 )
 def test_whatever_is_up_moves_as_its_equations_say(up):
     gravity, rail, hinge, com = UPS[up]
@@ -104,8 +105,8 @@ FAR_FROM_THE_REFERENCE = [
 @pytest.mark.parametrize(
     "edits",
     [
-        *FAR_FROM_THE_REFERENCE[:3],
-        *(pytest.param(edits, marks=pytest.mark.slow) for edits in FAR_FROM_THE_REFERENCE[3:]),
+        *FAR_FROM_THE_REFERENCE[:2],
+        *(pytest.param(edits, marks=pytest.mark.slow) for edits in FAR_FROM_THE_REFERENCE[2:]),
     ],
     ids=",".join,
 )

@@ -9,6 +9,7 @@ from mjcartpole.errors import ConfigError
 from mjcartpole.physics.load import load_model
 from mjcartpole.studies.parity import RUNGS, Subject, run_ladder
 from mjcartpole.studies.parity.dynamics import step_gym
+from nightly import only
 from parity_cases import POLE, REFERENCE, WRONG, changed, climb, failures
 
 
@@ -30,6 +31,10 @@ def test_the_reference_passes_the_full_ladder():
     assert [result.verdict for result in results] == ["holds"] * len(RUNGS)
 
 
+FEW = ("pole mass", "centre", "timestep", "slider axis", "friction", "contact", "integrator")
+"""Of all errors, one of each kind."""
+
+
 @functools.cache
 def steps_of_wrong(name):
     """The subject and its results on the rungs about single steps."""
@@ -37,7 +42,7 @@ def steps_of_wrong(name):
     return climb(changed(*changes), rungs=(2, 3, 4))
 
 
-@pytest.mark.parametrize("name", WRONG)
+@pytest.mark.parametrize("name", map(only(*FEW), WRONG))
 def test_a_small_error_fails_on_the_right_rung_for_the_right_cause(name):
     _, first_rung, cause = WRONG[name]
     subject, results = steps_of_wrong(name)
@@ -45,7 +50,7 @@ def test_a_small_error_fails_on_the_right_rung_for_the_right_cause(name):
     assert any(cause in found for found in subject.causes)
 
 
-@pytest.mark.parametrize("name", sorted(set(WRONG) - {"geom mass", "integrator"}))
+@pytest.mark.parametrize("name", map(only(*FEW), sorted(set(WRONG) - {"geom mass", "integrator"})))
 def test_a_failing_step_tells_its_story(name):
     _, _, cause = WRONG[name]
     _, results = steps_of_wrong(name)
