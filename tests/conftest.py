@@ -6,6 +6,7 @@ import signal
 import pytest
 from hypothesis import HealthCheck, settings
 
+from command_line import QUICK, call
 from mjcartpole.physics.simulation import silence_mujoco
 from nightly import FAST
 
@@ -18,6 +19,21 @@ settings.load_profile("untimed")
 def _quiet_mujoco():
     """Some tests diverge on purpose: no words on stderr, no log file where pytest runs."""
     silence_mujoco()
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    """Work in an empty folder."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def run(here, capsys):
+    """Train quickly; return the folder, runs/mine."""
+    code, *_ = call(["train", *QUICK, "--seed", "3", "--run-dir", "runs/mine"], capsys)
+    assert code == 0
+    return here / "runs" / "mine"
 
 
 def pytest_configure(config):

@@ -18,7 +18,7 @@ from mjcartpole.learning.session import Session
 from mjcartpole.learning.training import Training
 from mjcartpole.physics.load import load_model
 from mjcartpole.studies.finish_training import finish_training
-from nightly import only
+from nightly import few
 
 LIMIT = 20.0
 """Seconds that nothing may take."""
@@ -173,7 +173,7 @@ def replace(path, how, mine):
 @pytest.mark.parametrize(
     "part", [0, *(pytest.param(n, marks=pytest.mark.slow) for n in range(1, 7))]
 )
-@pytest.mark.parametrize("number", map(only(*range(0, len(PLACES), 3)), range(len(PLACES))))
+@pytest.mark.parametrize("number", few(range(len(PLACES)), *range(0, len(PLACES), 3)))
 def test_what_is_no_plain_file_is_one_line_and_leads_nowhere(number, part, place, capsys):
     kind, name = PLACES[number]
     for how in list(OTHERS)[(number + part) % 7 :: 7]:

@@ -18,6 +18,7 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 METHODS_FOLDER = "src/mjcartpole/learning/methods"
 GITHUB = sorted(path.relative_to(ROOT).as_posix() for path in (ROOT / ".github").rglob("*.yml"))
 YAML = [*GITHUB, "CITATION.cff", ".pre-commit-config.yaml"]
+LONGEST = 400  # lines of a file
 CUT = re.compile(r"^[ +]*…\n", re.MULTILINE)
 
 
@@ -122,6 +123,12 @@ def test_the_source_distribution_has_what_is_there():
     kept = {".gitignore", "videos", "pyproject.toml"}  # which a sdist need not have, or always has
     names = {path.name for path in ROOT.iterdir() if path.suffix in {".md", ".cff", ".yaml"}}
     assert {f"/{name}" for name in names - kept} <= set(included)
+
+
+@pytest.mark.parametrize("folder", ["src", "tests", "benchmarks", "scripts"])
+def test_no_file_is_long(folder):
+    paths = (path.relative_to(ROOT).as_posix() for path in (ROOT / folder).rglob("*.py"))
+    assert {name: n for name in paths if (n := len(read(name).splitlines())) > LONGEST} == {}
 
 
 def quotes():

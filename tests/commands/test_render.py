@@ -15,21 +15,14 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from command_line import call
 from mjcartpole import cli
 from mjcartpole.commands.options import EvalTarget
 from mjcartpole.commands.policies import set_up
 from mjcartpole.studies.film import play
-from nightly import only
+from nightly import few
 
 SMALL = ["--size", "160x120", "--quality", "draft"]
-
-
-def call(arguments, capsys):
-    """Run a command in this process; returns exit code, stdout and stderr."""
-    with pytest.raises(SystemExit) as stop:
-        cli.main([str(argument) for argument in arguments])
-    captured = capsys.readouterr()
-    return stop.value.code, captured.out, captured.err
 
 
 @pytest.fixture(scope="module")
@@ -340,7 +333,7 @@ def wait_for_something_in(folder):
 
 
 @pytest.mark.skipif(os.name == "nt", reason="kill ends a process without a word there")
-@pytest.mark.parametrize("name", map(only("out.gif"), ["out.gif", "pictures"]))
+@pytest.mark.parametrize("name", few(["out.gif", "pictures"], "out.gif"))
 @pytest.mark.parametrize(
     ("number", "code"),
     [(signal.SIGINT, 130), pytest.param(signal.SIGTERM, 143, marks=pytest.mark.slow)],

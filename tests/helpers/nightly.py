@@ -14,6 +14,6 @@ def examples(count):
     return settings(max_examples=max(5, count // 6) if FAST in os.environ else count)
 
 
-def only(*fast):
-    """Return a function that marks all cases but some as slow: `map(only("a", "b"), CASES)`."""
-    return lambda case: case if case in fast else pytest.param(case, marks=pytest.mark.slow)
+def few(cases, *fast):
+    """Return cases for parametrize: some are fast, the others run at night."""
+    return [case if case in fast else pytest.param(case, marks=pytest.mark.slow) for case in cases]

@@ -23,7 +23,7 @@ from mjcartpole.learning.checkpoints import (
 )
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.training import Training
-from nightly import examples, only
+from nightly import examples, few
 
 CONFIG = TrainConfig(backend="gym", episodes=12, seed=5)
 DOCUMENT = "<mujoco/>"
@@ -123,7 +123,7 @@ def test_a_checkpoint_of_a_config_without_task_and_method_is_read(content, scrat
     assert load_checkpoint(scratch, CONFIG, DOCUMENT).episodes == 7
 
 
-@pytest.mark.parametrize("step", map(only(41), [3, 41]))
+@pytest.mark.parametrize("step", few([3, 41], 41))
 def test_a_flipped_bit_is_refused_wherever_it_is(step, content, scratch):
     for place in (*range(0, 200, 1 + step // 10), *range(200, len(content), step)):
         damaged = bytearray(content)
@@ -132,7 +132,7 @@ def test_a_flipped_bit_is_refused_wherever_it_is(step, content, scratch):
         assert_refused(scratch)
 
 
-@pytest.mark.parametrize("step", map(only(83), [7, 83]))
+@pytest.mark.parametrize("step", few([7, 83], 83))
 def test_every_length_but_the_right_one_is_refused(step, content, scratch):
     lengths = (*range(0, 200, 1 + step // 20), *range(200, len(content), step), len(content) - 1)
     for length in lengths:

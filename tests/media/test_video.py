@@ -11,7 +11,7 @@ from PIL import Image
 
 from mjcartpole.errors import FileError, RenderError
 from mjcartpole.media.video import Video, write_video
-from nightly import only
+from nightly import few
 
 AVCOL_RANGE_MPEG = AVCOL_SPC_BT709 = AVCOL_PRI_BT709 = AVCOL_TRC_BT709 = 1
 """FFmpeg's numbers."""
@@ -273,7 +273,7 @@ ENDLESS = """
 @pytest.mark.parametrize("name", ["run.mp4", "run.gif", "run.webp", "run"])
 @pytest.mark.parametrize(
     "number",
-    map(only(signal.SIGTERM), [signal.SIGTERM, signal.SIGINT, getattr(signal, "SIGHUP", 1)]),
+    few([signal.SIGTERM, signal.SIGINT, getattr(signal, "SIGHUP", 1)], signal.SIGTERM),
 )
 def test_a_killed_process_leaves_nothing(tmp_path, name, number):
     command = [sys.executable, "-c", textwrap.dedent(ENDLESS), str(tmp_path / name)]
@@ -381,7 +381,7 @@ GROWING = """
     "count", [1000, pytest.param(20_000, marks=pytest.mark.slow)], ids=["short", "long"]
 )
 @pytest.mark.parametrize(
-    "name", map(only("run.mp4", "run.gif"), ["run.mp4", "run.gif", "run.webp", "run"])
+    "name", few(["run.mp4", "run.gif", "run.webp", "run"], "run.mp4", "run.gif")
 )
 def test_memory_does_not_grow_with_the_length(tmp_path, name, count):
     command = [sys.executable, "-c", textwrap.dedent(GROWING), str(tmp_path / name), str(count)]

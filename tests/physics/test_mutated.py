@@ -21,7 +21,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from nightly import only
+from nightly import few
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="limits of Linux processes")
 
@@ -364,7 +364,7 @@ def check(results: dict[int, str]) -> None:
     assert kinds["ModelError"] > len(results) / 50
 
 
-@pytest.mark.parametrize("count", map(only(20), [20, 60]))
+@pytest.mark.parametrize("count", few([20, 60], 20))
 def test_mutated_files(count):
     results = run_many(0, count)
     assert sorted(results) == list(range(count))

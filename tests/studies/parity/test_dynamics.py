@@ -8,11 +8,11 @@ import pytest
 
 from mjcartpole.physics.load import load_model
 from mjcartpole.studies.parity import Subject, run_ladder
-from nightly import only
+from nightly import few
 from parity_cases import POLE, WRONG, changed, climb, failures
 
 
-@pytest.mark.parametrize("height", map(only("0", "1e-9"), ["0", "1e-14", "1e-9", "1e-6", "-1e-7"]))
+@pytest.mark.parametrize("height", few(["0", "1e-14", "1e-9", "1e-6", "-1e-7"], "0", "1e-9"))
 def test_a_pole_that_is_balanced_on_its_hinge(height):
     text = changed((POLE, POLE.replace('"0 0 0.5"', f'"0 0 {height}"')))
     subject, results = climb(text, "itself", (2, 3, 4, 6, 9))

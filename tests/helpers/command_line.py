@@ -1,0 +1,16 @@
+"""Commands of ours, run in this process."""
+
+import pytest
+
+from mjcartpole import cli
+
+QUICK = ["--episodes", "30", "--no-video"]
+"""A training that takes no time."""
+
+
+def call(arguments, capsys):
+    """Run a command; return exit code, stdout and stderr."""
+    with pytest.raises(SystemExit) as stop:
+        cli.main([str(argument) for argument in arguments])
+    captured = capsys.readouterr()
+    return stop.value.code, captured.out, captured.err
