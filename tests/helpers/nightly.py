@@ -16,4 +16,9 @@ def examples(count):
 
 def few(cases, *fast):
     """Return cases for parametrize: some are fast, the others run at night."""
-    return [case if case in fast else pytest.param(case, marks=pytest.mark.slow) for case in cases]
+    return [case if case in fast else _nightly(case) for case in cases]
+
+
+def _nightly(case):
+    values = case if isinstance(case, tuple) else (case,)
+    return pytest.param(*values, marks=pytest.mark.slow)

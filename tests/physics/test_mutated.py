@@ -21,8 +21,6 @@ from xml.etree import ElementTree
 
 import pytest
 
-from nightly import few
-
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="limits of Linux processes")
 
 SECONDS_PER_FILE = 20
@@ -364,7 +362,7 @@ def check(results: dict[int, str]) -> None:
     assert kinds["ModelError"] > len(results) / 50
 
 
-@pytest.mark.parametrize("count", few([20, 60], 20))
+@pytest.mark.parametrize("count", [20, pytest.param(60, marks=pytest.mark.slow)])
 def test_mutated_files(count):
     results = run_many(0, count)
     assert sorted(results) == list(range(count))
