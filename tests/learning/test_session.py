@@ -65,15 +65,15 @@ def test_it_saves_when_it_is_stopped(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "engines",
+    ("first", "then"),
     few(itertools.product(["compiled", "python"], repeat=2), ("compiled", "python")),
 )
-def test_a_stopped_session_goes_on_to_the_same_end(engines, tmp_path):
+def test_a_stopped_session_goes_on_to_the_same_end(first, then, tmp_path):
     config = TrainConfig(episodes=400, seed=2, ties="random")
-    session = session_in(tmp_path, config=config, engine=engines[0])
+    session = session_in(tmp_path, config=config, engine=first)
     for finished in session.run(lambda: len(session.training.log) >= 50):
         assert finished < 400
-    again = session_in(tmp_path, config=config, engine=engines[1])
+    again = session_in(tmp_path, config=config, engine=then)
     again.resume(saved(tmp_path, config=config))
     assert len(again.training.log) == len(session.training.log)
     for _ in again.run(never):
