@@ -362,10 +362,9 @@ def check(results: dict[int, str]) -> None:
     assert kinds["ModelError"] > len(results) / 50
 
 
-@pytest.mark.parametrize("count", [20, pytest.param(60, marks=pytest.mark.slow)])
-def test_mutated_files(count):
-    results = run_many(0, count)
-    assert sorted(results) == list(range(count))
+def test_60_mutated_files():
+    results = run_many(0, 60)
+    assert sorted(results) == list(range(60))
     check(results)
 
 
