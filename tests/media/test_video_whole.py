@@ -1,4 +1,4 @@
-"""A video is there whole, or not at all: interrupted, killed, without room; in flat memory and silence."""
+"""A video is there whole, or not at all: interrupted, killed, without room; in flat memory."""
 
 import os
 import signal
