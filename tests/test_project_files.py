@@ -1,17 +1,26 @@
 """The project's own files agree, and what CONTRIBUTING.md quotes is the real code."""
 
+import importlib.util
 import re
 import runpy
+import sys
 import tomllib
 from pathlib import Path
 
+import gymnasium
 import numpy as np
 import pytest
 
+from command_line import call
+from mjcartpole.commands import registry
+from mjcartpole.envs.registration import env_id
 from mjcartpole.errors import RenderError
+from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.methods import METHODS
+from mjcartpole.learning.training import train
 from mjcartpole.media.scene import Scene
 from mjcartpole.physics.load import load_model
+from mjcartpole.task import TASKS
 
 ROOT = Path(__file__).resolve().parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
@@ -137,12 +146,22 @@ def quotes():
     return [pytest.param(*one, id=f"{number}-{one[1]}") for number, one in enumerate(found)]
 
 
-def scratch(title):
-    """Run a complete example of CONTRIBUTING.md; return what it defines."""
-    code = next(quote.values[2] for quote in quotes() if quote.values[1] == f"example: {title}")
-    names = {"__name__": "scratch"}
-    exec(compile(code, f"CONTRIBUTING.md, {title}", "exec"), names)
-    return names
+@pytest.fixture
+def scratch(tmp_path, monkeypatch):
+    """Import complete examples of CONTRIBUTING.md by their titles."""
+
+    def load(title):
+        word = title.rsplit(maxsplit=1)[1]
+        file = tmp_path / f"scratch_{word}.py"
+        texts = (quote.values[2] for quote in quotes() if quote.values[1] == f"example: {title}")
+        file.write_text(next(texts), encoding="utf-8")
+        spec = importlib.util.spec_from_file_location(file.stem, file)
+        module = importlib.util.module_from_spec(spec)
+        monkeypatch.setitem(sys.modules, spec.name, module)
+        spec.loader.exec_module(module)
+        return module
+
+    return load
 
 
 @pytest.mark.parametrize(("kind", "name", "text"), quotes())
@@ -180,8 +199,9 @@ def test_every_file_that_contributing_names_is_there():
     assert missing == {"tests/media/test_scope.py"}  # of the example
 
 
-def test_the_renderer_of_the_example_draws():
-    renderer = scratch("a renderer")["ScopeRenderer"](Scene(load_model(), 80, 60, "side", "draft"))
+def test_the_renderer_of_the_example_draws(scratch):
+    scene = Scene(load_model(), 80, 60, "side", "draft")
+    renderer = scratch("a renderer").ScopeRenderer(scene)
     with renderer:
         frame = renderer.render((0.0, 0.0, 0.0, 0.0))
         assert frame.shape == (60, 80, 3)
@@ -191,3 +211,23 @@ def test_the_renderer_of_the_example_draws():
         assert row > 50 and column > 70 and rest == []
     with pytest.raises(RenderError, match="closed"):
         renderer.render((0.0, 0.0, 0.0, 0.0))
+
+
+def test_the_task_of_the_example_is_learned_alike_by_both_engines(scratch):
+    calm = scratch("a task").CALM
+    try:
+        config = TrainConfig(task=calm.name, episodes=60, seed=1)
+        found = [train(config, engine=engine) for engine in ("compiled", "python")]
+        assert found[0].q_table.tobytes() == found[1].q_table.tobytes()
+        assert gymnasium.make(env_id(calm)).spec.max_episode_steps == 300
+    finally:
+        del TASKS[calm.name], gymnasium.registry[env_id(calm)]
+
+
+def test_the_command_of_the_example_runs(scratch, monkeypatch, capsys):
+    monkeypatch.setattr(registry, "COMMANDS", [*registry.COMMANDS, scratch("a command").Bins])
+    assert call(["bins", "--preset", "article"], capsys) == (0, "1 x 1 x 25 x 25\n", "")
+    code, out, err = call(["bins", "--preset", "none"], capsys)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert "available: " in err
+    assert "Whose." in call(["bins", "--help"], capsys)[1]
