@@ -1,6 +1,8 @@
 """A task that is written in a few lines trains, films and evaluates on both backends."""
 
 import math
+import subprocess
+import sys
 import warnings
 
 import gymnasium
@@ -154,3 +156,26 @@ def test_the_command_line_trains_films_and_evaluates_it(backend, tmp_path, monke
     assert figures.split("\n", 1)[1] in trained
     assert run("evaluate", "run", "--task", "CartPole-v1", "--json") == 0
     assert '"minimum": -' not in capsys.readouterr().out
+
+
+AT_EXIT = """
+import gymnasium, mjcartpole
+
+def pay(x, x_dot, theta, theta_dot, terminated):
+    return 0.5
+
+mjcartpole.register_task(mjcartpole.Task("Half-v0", reward=pay))
+mjcartpole.train(mjcartpole.TrainConfig(task="Half-v0", episodes=5))
+env = gymnasium.make("mjcartpole/Half-v0", render_mode="rgb_array")
+env.reset()
+env.render()
+"""
+
+
+@pytest.mark.slow
+def test_an_environment_that_a_compiled_reward_keeps_alive_goes_in_silence():
+    """The compiler holds on to the reward, and with it to all that the script has made."""
+    done = subprocess.run(
+        [sys.executable, "-c", AT_EXIT], capture_output=True, text=True, check=True
+    )
+    assert "ignored" not in done.stderr

@@ -1,5 +1,7 @@
 """Frames of a cart-pole: a state in, a picture out."""
 
+import sys
+from collections.abc import Callable
 from types import TracebackType
 from typing import Final, Literal, Protocol, Self, get_args
 
@@ -222,9 +224,10 @@ class GLRenderer(TakesTurns):
                 self._context.release()
             self._context.free()
 
-    def __del__(self) -> None:
-        # Frees in order where nobody has; __init__ may have failed before there was anything.
-        if hasattr(self, "_context"):
+    def __del__(self, is_exiting: Callable[[], bool] = sys.is_finalizing) -> None:
+        # Frees in order where nobody has; __init__ may have failed before there was anything. At
+        # the very end modules are gone, and all goes with the process.
+        if hasattr(self, "_context") and not is_exiting():
             self.close()
 
 
