@@ -286,8 +286,9 @@ def checkout(tmp_path_factory):
     programs.mkdir(parents=True)
     python = f"env PYTHONPATH='{source}' '{sys.executable}'"
     make_program(programs / "python", f'{python} "$@"')
-    for name in ("mjcartpole", "ruff", "mypy"):
-        make_program(programs / name, f'{python} -m {name} "$@"')
+    modules = {name: name for name in ("mjcartpole", "ruff", "mypy")}
+    for name, module in (modules | {"codespell": "codespell_lib"}).items():
+        make_program(programs / name, f'{python} -m {module} "$@"')
     for stamp in ("installed", "installed-dev"):
         (programs.parent / stamp).touch()
     # What pages call `path/to/…` are packages that are installed here.
