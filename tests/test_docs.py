@@ -27,6 +27,7 @@ from PIL import Image
 import mjcartpole
 from mjcartpole import cli
 from mjcartpole.media.gl import can_use
+from nightly import few
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = ("README.md", *sorted(f"docs/{path.name}" for path in (ROOT / "docs").glob("*.md")))
@@ -51,7 +52,7 @@ FAST = {
     },
     "docs/videos.md": {"mjcartpole render runs/tuned-mujoco-seed0"},
 }
-"""What the fast tests run: commands, and Python blocks by their first line."""
+"""What short reads run: commands, and Python blocks by their first line."""
 
 NOT_HERE = {
     "make test": "it is the suite that this test belongs to",
@@ -315,7 +316,7 @@ def reads(checkout, tmp_path_factory):
     return lambda page: Reader(copy_of(checkout if page == "README.md" else after_make_train()))
 
 
-@pytest.mark.parametrize("page", FAST)
+@pytest.mark.parametrize("page", few(FAST, "README.md", "docs/variants.md"))
 def test_a_page_in_short(page, reads):
     reads(page).follows(page, only=FAST[page])
 

@@ -13,6 +13,7 @@ from mjcartpole.physics.simulation import Simulation
 from mjcartpole.physics.unmodelled_effects import differs_from
 from mjcartpole.studies.evaluation import evaluate
 from mjcartpole.studies.parity import Subject, run_ladder
+from nightly import few
 
 REFERENCE = load_model("cartpole").xml
 EDITS = {
@@ -160,7 +161,7 @@ def test_each_steps(name):
         assert state[0] > 0.1
 
 
-@single
+@pytest.mark.parametrize("name", few(sorted(set(SAID) - SEVERAL_POLES), "bob", "damped"))
 def test_each_moves_as_its_own_equations_do(name):
     results = list(run_ladder(Subject(load_model(name), "itself", quick=True), (1, 2, 3, 4, 5)))
     assert {result.verdict for result in results} <= {"holds", "skipped"}
