@@ -76,6 +76,8 @@ class Task:
         Raises:
             ConfigError: See above.
         """
+        # Without the sum, numpy calls 0.0 to -0.0 a range that runs backwards.
+        object.__setattr__(self, "start_high", self.start_high + 0.0)
         bounds = self.start_low, self.start_high
         for rule, holds in {
             "x_limit and theta_limit are more than 0, or infinite": self.x_limit > 0

@@ -7,6 +7,7 @@ import pytest
 
 from mjcartpole.envs.cartpole import CartPoleEnv
 from mjcartpole.envs.options import reset_options, usual
+from mjcartpole.envs.vector import CartPoleVectorEnv
 from mjcartpole.errors import ConfigError
 from mjcartpole.task import CARTPOLE_V1
 
@@ -74,3 +75,9 @@ def test_edits_that_make_no_sense_leave_the_episode_as_it_is():
         env.reset(options={"edits": {"pole.lenght": 3.0}})
     np.testing.assert_array_equal(env.state, before)
     assert env.length == 0.5
+
+
+@pytest.mark.parametrize("make", [CartPoleEnv, CartPoleVectorEnv])
+def test_a_start_of_nothing_but_zeros_has_no_wrong_sign(make):
+    observation, _ = make().reset(seed=0, options={"low": 0.0, "high": -0.0})
+    assert not observation.any()

@@ -47,7 +47,7 @@ def reset_options(options: Mapping[str, Any], otherwise: ResetOptions) -> ResetO
         raise ConfigError(str(error)) from error
     if not math.isfinite(high - low):
         raise ConfigError(f"reset starts between two finite bounds, not low={low}, high={high}")
-    return ResetOptions(low, high, given.edits or ())
+    return ResetOptions(low, high + 0.0, given.edits or ())
 
 
 def _known(options: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -93,7 +93,7 @@ def start_bounds(
     if low > high:
         raise ConfigError(f"low ({low}) is above high ({high}); the starting state lies between")
     _finite("the distance from low to high", high - low)
-    return low, high
+    return low, high + 0.0
 
 
 def _finite(name: str, value: SupportsFloat | str) -> float:

@@ -5,7 +5,7 @@ import pytest
 
 from mjcartpole.errors import ConfigError
 from mjcartpole.learning.config import TrainConfig
-from mjcartpole.learning.methods.action_values import choose
+from mjcartpole.learning.methods.action_values import choose, draw_table
 
 
 def test_greedy_takes_the_better_action_and_the_first_of_equals(at_work):
@@ -68,3 +68,8 @@ def test_a_tie_is_drawn_where_that_is_asked_for(ties, draws, action):
 def test_values_that_make_no_sense(method, name, value):
     with pytest.raises(ConfigError, match=f"{name} must be"):
         TrainConfig(method=method, **{name: value})
+
+
+def test_a_first_table_of_nothing_but_zeros_has_no_wrong_sign():
+    table = draw_table(TrainConfig(q_init_low=0.0, q_init_high=-0.0), 3, np.random.default_rng(0))
+    assert table.tolist() == [0.0] * 6

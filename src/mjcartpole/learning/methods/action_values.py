@@ -84,7 +84,8 @@ class QTable(NamedTuple):
 
 def draw_table(p: Any, n_states: int, rng: np.random.Generator) -> npt.NDArray[np.float64]:
     """Return a first table, flat, drawn uniformly from `q_init_low` to `q_init_high`."""
-    return rng.uniform(p.q_init_low, p.q_init_high, size=n_states * N_ACTIONS)
+    # Without the sum, numpy calls 0.0 to -0.0 a range that runs backwards.
+    return rng.uniform(p.q_init_low, p.q_init_high + 0.0, size=n_states * N_ACTIONS)
 
 
 def make_memory(p: Any, n_states: int, rng: np.random.Generator) -> QTable:
