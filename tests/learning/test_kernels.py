@@ -60,7 +60,7 @@ def test_rows_are_the_discretizers(bins, low, width, values):
     edges = [(low[axis], high[axis], math.nextafter(high[axis], -9)) for axis in range(4)]
     for point in (values, *zip(*edges, strict=True)):
         expected = discretizer.row_of(point, grid.grid)
-        assert stepping._row_of(tuple(point), arrays) == expected < grid.n_states
+        assert kernels._row_of(tuple(point), arrays) == expected < grid.n_states
 
 
 rates = st.sampled_from([0.0, 0.1, 1.0]) | st.floats(0, 1)

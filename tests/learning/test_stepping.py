@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from mjcartpole import task
 from mjcartpole.errors import SimulationError
-from mjcartpole.learning import compiled, stepping
+from mjcartpole.learning import compiled, kernels, stepping
 from mjcartpole.learning.discretizer import Discretizer
 from mjcartpole.physics.library import libmujoco
 from mjcartpole.physics.load import load_model
@@ -34,7 +34,8 @@ state_values = st.floats() | st.sampled_from(
 states = st.tuples(*[state_values] * 4)
 GYM = stepping.GymPhysics(-10.0, 10.0)
 TWO = Simulation(load_model("twopoles"))
-POLES = compiled._physics(TWO)
+MEMORY = compiled._Memory.of(TWO)
+POLES = compiled._physics(TWO, MEMORY)
 
 
 def bits(*values):
@@ -51,7 +52,7 @@ def begin(physics, rules, rng):
 
 @numba.njit
 def row(physics, state, grid):
-    return stepping.row(physics, state, grid)
+    return kernels._row_of(stepping.observe(physics, state), grid)
 
 
 RULES = compiled._rules(task.CARTPOLE_V1)

@@ -2,9 +2,10 @@
 
 import logging
 from collections.abc import Callable, Iterator
-from typing import Final
+from typing import Final, NamedTuple, Self
 
 import numpy as np
+import numpy.typing as npt
 from numba.core import config, event
 
 from mjcartpole.envs.backend import Backend
@@ -71,7 +72,8 @@ class CompiledLoop:
         self._simulation = (
             Simulation(load_model(model), integrator) if backend == "mujoco" else None
         )
-        self._physics = _physics(self._simulation)
+        self._memory = _Memory.of(self._simulation)
+        self._physics = _physics(self._simulation, self._memory)
         self._task, self._rules = task, _rules(task)
         size = self._simulation.size if self._simulation else len(state_names())
         self._chunk = _control_steps(self._simulation)
@@ -187,7 +189,20 @@ class CompiledLoop:
             raise in_episode(error, number, int(steps)) from error
 
 
-def _physics(simulation: Simulation | None) -> Physics:
+class _Memory(NamedTuple):
+    """Arrays that compiled code is given the addresses of; see `MujocoPhysics`."""
+
+    joints: npt.NDArray[np.int64]
+    seen: npt.NDArray[np.float64]
+    moved: npt.NDArray[np.float64]
+
+    @classmethod
+    def of(cls, simulation: Simulation | None) -> Self:
+        joints = np.array(simulation.cartpole.joints if simulation else (), np.int64)
+        return cls(joints, np.zeros(2 * joints.size), np.zeros(joints.size))
+
+
+def _physics(simulation: Simulation | None, memory: _Memory) -> Physics:
     if simulation is None:
         return GymPhysics(-FORCE, FORCE)
     cartpole, model, data = simulation.cartpole, simulation.model, simulation.data
@@ -195,17 +210,18 @@ def _physics(simulation: Simulation | None) -> Physics:
     return MujocoPhysics(
         model=model._address,
         data=data._address,
-        qpos=data.qpos,
-        qvel=data.qvel,
-        ctrl=data.ctrl,
-        joints=np.array(cartpole.joints, np.int64),
+        qpos=data.qpos.ctypes.data,
+        qvel=data.qvel.ctypes.data,
+        ctrl=data.ctrl.ctypes.data,
+        joints=memory.joints.ctypes.data,
+        n_joints=len(memory.joints),
         left=left,
         right=right,
         timestep=float(model.opt.timestep),
         substeps=cartpole.substeps,
         explicit=simulation.integrator == "gym",
-        seen=np.zeros(simulation.size),
-        moved=np.zeros(len(cartpole.joints)),
+        seen=memory.seen.ctypes.data,
+        moved=memory.moved.ctypes.data,
     )
 
 

@@ -37,7 +37,7 @@ from mjcartpole.learning.stepping import (
     has_diverged,
     is_over,
     note,
-    row,
+    observe,
 )
 from mjcartpole.physics import cartpole_v1
 from mjcartpole.physics.simulation import LARGEST_SANE
@@ -62,6 +62,7 @@ class Scratch(NamedTuple):
 
 
 _ending_index = compiled(episodes.ending_index)
+_row_of = compiled(discretizer.row_of)
 
 
 @compiled
@@ -82,7 +83,7 @@ def _learn_episode(
     """Play an episode and learn; returns its return, steps and ending."""
     states, actions, rewards = scratch.states, scratch.actions, scratch.rewards
     state = begin(physics, rules, rngs[0])
-    s = row(physics, state, grid)
+    s = _row_of(observe(physics, state), grid)
     states[0] = s
     total, steps, over, terminated = 0.0, 0, False, False
     while not over:
@@ -97,7 +98,7 @@ def _learn_episode(
         actions[steps], rewards[steps] = a, r
         steps += 1
         over = terminated or steps == rules.time_limit
-        s_next = row(physics, state, grid)
+        s_next = _row_of(observe(physics, state), grid)
         after_step(p, memory, rates, Transition(s, a, r, s_next, terminated, over), rngs[1])
         states[steps] = s_next
         s = s_next
@@ -120,7 +121,7 @@ def _play_episode(
     state = begin(physics, rules, rng)
     total, steps, over, terminated = 0.0, 0, False, False
     while not over:
-        state = advance(physics, state, actions[row(physics, state, grid)])
+        state = advance(physics, state, actions[_row_of(observe(physics, state), grid)])
         terminated = is_over(rules, state)
         if terminated and has_diverged(state):
             note(physics, state, steps, failure)

@@ -17,10 +17,9 @@ import numba
 import numpy as np
 import numpy.typing as npt
 from numba import types
-from numba.extending import overload
+from numba.extending import intrinsic, overload
 
 from mjcartpole import task
-from mjcartpole.learning.discretizer import Grid, row_of
 from mjcartpole.physics import cartpole_v1
 from mjcartpole.physics.simulation import FARTHEST_SANE, LARGEST_SANE
 
@@ -43,17 +42,23 @@ class Rules(NamedTuple):
 
 
 class MujocoPhysics(NamedTuple):
-    """A `Simulation`, which must outlive this, as compiled code sees it."""
+    """A `Simulation`, which must outlive this, as compiled code sees it.
+
+    Arrays are addresses here: Numba would count the references to each whenever this is passed on,
+    which costs as much as a tenth of a step.
+    """
 
     model: int
-    """Address of the mjModel."""
+    """Of the mjModel."""
     data: int
-    """Address of the mjData, whose arrays follow."""
-    qpos: Floats
-    qvel: Floats
-    ctrl: Floats
-    joints: npt.NDArray[np.int64]
-    """Of the cart, then of each pole, shape (1 + poles,)."""
+    """Of the mjData, whose arrays follow."""
+    qpos: int
+    qvel: int
+    ctrl: int
+    joints: int
+    """int64 indices of the cart's, then of each pole's, shape (1 + poles,)."""
+    n_joints: int
+    """How many joints these are."""
     left: float
     right: float
     """Controls of the two actions."""
@@ -61,9 +66,9 @@ class MujocoPhysics(NamedTuple):
     substeps: int
     explicit: bool
     """Whether positions move by the old velocities (integrator `gym`)."""
-    seen: Floats
+    seen: int
     """Memory for the observation, shape (2 + 2 poles,)."""
-    moved: Floats
+    moved: int
     """Memory for positions, shape (1 + poles,)."""
 
 
@@ -99,8 +104,26 @@ def compiled(function: F) -> F:
     return cast(F, jitted)
 
 
+def _array_at(kind: types.Type) -> Callable[[int], Any]:
+    """Return what makes an array of an address in compiled code."""
+
+    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        return builder.inttoptr(values[0], context.get_value_type(signature.return_type))
+
+    pointer: Any = types.CPointer(kind)  # type: ignore[no-untyped-call]
+
+    @intrinsic
+    def array_at(context: Any, address: Any) -> Any:
+        return pointer(address), generate
+
+    return cast(Callable[[int], Any], array_at)
+
+
+_floats, _ints = _array_at(types.float64), _array_at(types.int64)
+
+
 _max_abs = compiled(task.max_abs)
-_row_of = compiled(row_of)
+_carray = numba.carray  # type: ignore[attr-defined]
 _cartpole_v1_step = compiled(cartpole_v1.cartpole_v1_step)
 
 _mj_step = types.ExternalFunction("mj_step", types.void(types.intp, types.intp))
@@ -125,9 +148,10 @@ def _for_each(mujoco: F, gym: F) -> Callable[[F], F]:
 
 def _begin_mujoco(physics: AnyPhysics, rules: Rules, rng: np.random.Generator) -> State:
     _mj_reset(physics.model, physics.data)
-    for joint in physics.joints:
-        physics.qpos[joint] = rules.low + rules.width * rng.random()
-        physics.qvel[joint] = rules.low + rules.width * rng.random()
+    joints, qpos, qvel = _ints(physics.joints), _floats(physics.qpos), _floats(physics.qvel)
+    for index in range(physics.n_joints):
+        qpos[joints[index]] = rules.low + rules.width * rng.random()
+        qvel[joints[index]] = rules.low + rules.width * rng.random()
     return _as_one_pole(physics)
 
 
@@ -152,16 +176,16 @@ def begin(physics: AnyPhysics, rules: Rules, rng: np.random.Generator) -> State:
 
 
 def _advance_mujoco(physics: AnyPhysics, state: State, action: int) -> State:
-    qpos, qvel, h = physics.qpos, physics.qvel, physics.timestep
-    joints, moved = physics.joints, physics.moved
-    physics.ctrl[0] = physics.right if action == 1 else physics.left
+    joints, qpos, qvel = _ints(physics.joints), _floats(physics.qpos), _floats(physics.qvel)
+    moved, h = _floats(physics.moved), physics.timestep
+    _floats(physics.ctrl)[0] = physics.right if action == 1 else physics.left
     for _ in range(physics.substeps):
-        for index, joint in enumerate(joints):
-            moved[index] = qpos[joint] + h * qvel[joint]
+        for index in range(physics.n_joints):
+            moved[index] = qpos[joints[index]] + h * qvel[joints[index]]
         _mj_step(physics.model, physics.data)
         if physics.explicit:
-            for index, joint in enumerate(joints):
-                qpos[joint] = moved[index]
+            for index in range(physics.n_joints):
+                qpos[joints[index]] = moved[index]
     return _as_one_pole(physics)
 
 
@@ -178,40 +202,44 @@ def advance(physics: AnyPhysics, state: State, action: int) -> State:
 
 @compiled
 def _as_one_pole(physics: AnyPhysics) -> State:
-    joints, qpos, qvel = physics.joints, physics.qpos, physics.qvel
+    joints, qpos, qvel = _ints(physics.joints), _floats(physics.qpos), _floats(physics.qvel)
     theta, theta_dot = qpos[joints[1]], qvel[joints[1]]
-    if len(joints) > 2:
-        theta, theta_dot = _max_abs(qpos[joints[1:]]), _max_abs(qvel[joints[1:]])
+    if physics.n_joints > 2:
+        theta, theta_dot = _worst(qpos, physics), _worst(qvel, physics)
     return qpos[joints[0]], qvel[joints[0]], theta, theta_dot
+
+
+@compiled
+def _worst(values: Any, physics: AnyPhysics) -> float:
+    """Return the largest size among the poles' values."""
+    joints, poles = _ints(physics.joints), _floats(physics.moved)
+    for index in range(1, physics.n_joints):
+        poles[index - 1] = values[joints[index]]
+    return _max_abs(_carray(poles, physics.n_joints - 1))
 
 
 # --- look at it ---------------------------------------------------------------------------------
 
 
-def _row_mujoco(physics: AnyPhysics, state: State, grid: Grid) -> int:
-    if len(physics.joints) == 2:
-        return _row_of(_rounded(state), grid)
-    for index, joint in enumerate(physics.joints):
-        physics.seen[2 * index] = np.float64(np.float32(physics.qpos[joint]))
-        physics.seen[2 * index + 1] = np.float64(np.float32(physics.qvel[joint]))
-    return _row_of(physics.seen, grid)
+def _observe_mujoco(physics: AnyPhysics, state: State) -> Any:
+    joints, seen = _ints(physics.joints), _floats(physics.seen)
+    qpos, qvel = _floats(physics.qpos), _floats(physics.qvel)
+    for index in range(physics.n_joints):
+        seen[2 * index] = np.float64(np.float32(qpos[joints[index]]))
+        seen[2 * index + 1] = np.float64(np.float32(qvel[joints[index]]))
+    return seen
 
 
-def _row_gym(physics: AnyPhysics, state: State, grid: Grid) -> int:
-    return _row_of(_rounded(state), grid)
-
-
-@_for_each(_row_mujoco, _row_gym)
-def row(physics: AnyPhysics, state: State, grid: Grid) -> int:
-    """Return the table's row of the float32 observation."""
-    raise NotImplementedError
-
-
-@compiled
-def _rounded(state: State) -> State:
+def _observe_gym(physics: AnyPhysics, state: State) -> State:
     x, x_dot = np.float64(np.float32(state[0])), np.float64(np.float32(state[1]))
     theta, theta_dot = np.float64(np.float32(state[2])), np.float64(np.float32(state[3]))
     return x, x_dot, theta, theta_dot
+
+
+@_for_each(_observe_mujoco, _observe_gym)
+def observe(physics: AnyPhysics, state: State) -> Any:
+    """Return the float32 observation, as plain floats again."""
+    raise NotImplementedError
 
 
 @compiled
@@ -235,9 +263,10 @@ def has_diverged(state: State) -> bool:
 
 def _note_mujoco(physics: AnyPhysics, state: State, steps: int, failure: Floats) -> None:
     failure[0] = steps
-    for index, joint in enumerate(physics.joints):
-        failure[1 + 2 * index] = physics.qpos[joint]
-        failure[2 + 2 * index] = physics.qvel[joint]
+    joints, qpos, qvel = _ints(physics.joints), _floats(physics.qpos), _floats(physics.qvel)
+    for index in range(physics.n_joints):
+        failure[1 + 2 * index] = qpos[joints[index]]
+        failure[2 + 2 * index] = qvel[joints[index]]
 
 
 def _note_gym(physics: AnyPhysics, state: State, steps: int, failure: Floats) -> None:
