@@ -4,7 +4,6 @@ Nothing here, or at the top of a command's file, imports MuJoCo or a video libra
 reads all of them.
 """
 
-from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -34,8 +33,11 @@ class UsageError(MjCartPoleError):
 
 
 @dataclass(frozen=True)
-class Command(ABC):
-    """A command: each field is a flag, each docstring its help."""
+class Command:
+    """A command: each field is a flag, each docstring its help.
+
+    It is no `abc.ABC`: of those tyro asks a type checker, whose import costs a tenth of a `--help`.
+    """
 
     @classmethod
     def default(cls, words: Sequence[str]) -> Self | None:
@@ -49,7 +51,6 @@ class Command(ABC):
         """
         return None
 
-    @abstractmethod
     def run(self) -> int:
         """Do it, and return the exit code.
 
@@ -57,6 +58,7 @@ class Command(ABC):
             MjCartPoleError: Something cannot be used; its message is all that is said of it.
             Interrupted: After Ctrl-C, SIGTERM or SIGHUP.
         """
+        raise NotImplementedError
 
 
 @dataclass(frozen=True)

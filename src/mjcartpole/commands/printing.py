@@ -2,10 +2,8 @@
 
 from typing import TYPE_CHECKING
 
-from mjcartpole.studies.evaluation import Evaluation
-from mjcartpole.studies.statistics import CONFIDENCE
-
 if TYPE_CHECKING:
+    from mjcartpole.studies.evaluation import Evaluation
     from mjcartpole.studies.seeds import ManyResult
 
 
@@ -19,7 +17,7 @@ def counted(count: int, what: str) -> str:
     return f"{count:,} {what}" if count == 1 else f"{count:,} {what}s"
 
 
-def print_evaluation(result: Evaluation, where: str = "") -> None:
+def print_evaluation(result: "Evaluation", where: str = "") -> None:
     """Print mean, minimum, and how the episodes ended.
 
     Args:
@@ -37,6 +35,8 @@ def print_evaluation(result: Evaluation, where: str = "") -> None:
 
 def print_seeds(many: "ManyResult") -> None:
     """Print a line per seed, and the statistics over them."""
+    from mjcartpole.studies.statistics import CONFIDENCE
+
     print("   seed   greedy mean   minimum")
     for found in many.seeds:
         if found.evaluation is not None:

@@ -6,7 +6,6 @@ from pathlib import Path
 from mjcartpole.commands.options import RUNS
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.engine import Engine
-from mjcartpole.learning.folders import free_folder
 from mjcartpole.learning.naming import run_name
 
 
@@ -23,6 +22,8 @@ class RunLocation:
 
     def folder(self, config: TrainConfig, seeds: int = 1) -> Path:
         """Return the run's folder: with overwrite the very one, else one that is not there yet."""
+        from mjcartpole.learning.folders import free_folder
+
         usual = self.usual_folder(config, seeds)
         free = self.run_dir is None and not self.overwrite
         return free_folder(usual.parent, usual.name) if free else usual

@@ -1,7 +1,7 @@
 """Episodes as generators over any gymnasium environment: the reference loop."""
 
 from collections.abc import Callable, Iterator
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import gymnasium
 import numpy as np
@@ -10,16 +10,18 @@ import numpy.typing as npt
 from mjcartpole.errors import SimulationError
 from mjcartpole.learning.discretizer import Discretizer
 from mjcartpole.learning.episodes import ENDINGS, Episode, ending_index
-from mjcartpole.learning.learner import Learner
 from mjcartpole.learning.methods.experience import Trajectory, Transition
 from mjcartpole.task import CARTPOLE_V1
+
+if TYPE_CHECKING:
+    from mjcartpole.learning.learner import Learner
 
 State = npt.NDArray[np.float64]
 
 
 def learn_episodes(
     env: gymnasium.Env[Any, Any],
-    learner: Learner,
+    learner: "Learner",
     discretizer: Discretizer,
     numbers: range,
 ) -> Iterator[Episode]:
@@ -42,7 +44,7 @@ def learn_episodes(
 
 def _learn_episode(
     env: gymnasium.Env[Any, Any],
-    learner: Learner,
+    learner: "Learner",
     discretizer: Discretizer,
     observation: npt.NDArray[np.float32],
     number: int,
