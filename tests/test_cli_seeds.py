@@ -59,6 +59,7 @@ def test_a_seed_without_a_policy_is_named_and_left_out(seeds, capsys):
         assert "mjcartpole train --resume runs/many" in err
 
 
+@pytest.mark.slow
 def test_the_median_of_many_seeds_is_filmed(seeds, capsys):
     rows = [row.split(",") for row in (seeds / "seeds.csv").read_text().splitlines()[1:]]
     median = sorted((float(mean), int(seed)) for seed, mean, *_ in rows)[1][1]

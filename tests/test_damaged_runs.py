@@ -173,7 +173,7 @@ def replace(path, how, mine):
 @pytest.mark.parametrize(
     "part", [0, *(pytest.param(n, marks=pytest.mark.slow) for n in range(1, 7))]
 )
-@pytest.mark.parametrize("number", few(range(len(PLACES)), *range(0, len(PLACES), 3)))
+@pytest.mark.parametrize("number", few(range(len(PLACES)), *range(0, len(PLACES), 12)))
 def test_what_is_no_plain_file_is_one_line_and_leads_nowhere(number, part, place, capsys):
     kind, name = PLACES[number]
     for how in list(OTHERS)[(number + part) % 7 :: 7]:
@@ -223,7 +223,7 @@ def damage_bytes(path, rng):
 
 
 @pytest.mark.parametrize("seed", [0, *(pytest.param(n, marks=pytest.mark.slow) for n in range(9))])
-@pytest.mark.parametrize("damage", [damage_value, damage_bytes])
+@pytest.mark.parametrize("damage", few([damage_value, damage_bytes], damage_bytes))
 def test_damaged_values_and_bytes_are_one_line(damage, seed, place, capsys):
     rng = random.Random(f"{damage.__name__}{seed}")
     for kind in ("one", "gym", "many", "cut", "manycut"):

@@ -316,7 +316,7 @@ def reads(checkout, tmp_path_factory):
     return lambda page: Reader(copy_of(checkout if page == "README.md" else after_make_train()))
 
 
-@pytest.mark.parametrize("page", few(FAST, "README.md", "docs/variants.md"))
+@pytest.mark.parametrize("page", few(FAST, "README.md"))
 def test_a_page_in_short(page, reads):
     reads(page).follows(page, only=FAST[page])
 

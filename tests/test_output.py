@@ -10,6 +10,7 @@ import pytest
 
 from mjcartpole import output
 from mjcartpole.physics.load import load_model
+from nightly import few
 
 TRAIN = "train --episodes 20 --no-video --run-dir run"
 FULL = "error: stdout could not be written (No space left on device)"
@@ -54,9 +55,10 @@ def test_a_training_goes_on_when_nobody_listens(where, tmp_path):
     assert_complete(tmp_path / "run")
 
 
+@pytest.mark.slow
 @on_unix
 @needs_full
-@pytest.mark.parametrize("unbuffered", ["", pytest.param("1", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("unbuffered", ["", "1"])
 def test_a_full_disk_under_stdout_is_one_line_and_the_run_is_complete(unbuffered, tmp_path):
     code, _, err = shell(f"MJ {TRAIN} > /dev/full", tmp_path, PYTHONUNBUFFERED=unbuffered)
     assert (code, err.count(FULL), "Traceback" in err) == (2, 1, False)
@@ -91,6 +93,7 @@ def test_nothing_is_written_into_a_file_that_takes_a_closed_streams_place(tmp_pa
         assert (tmp_path / "run" / name).read_bytes() == (tmp_path / "other" / name).read_bytes()
 
 
+@pytest.mark.slow
 @on_unix
 def test_a_watch_whose_reader_has_left_ends(tmp_path):
     (tmp_path / "mine.xml").write_text(load_model().xml)
@@ -104,7 +107,7 @@ def test_a_watch_whose_reader_has_left_ends(tmp_path):
 @pytest.mark.parametrize("encoding", ["ascii", pytest.param("cp1252", marks=pytest.mark.slow)])
 @pytest.mark.parametrize(
     "command",
-    ["--help", "doctor", pytest.param("parity --quick --rungs 5", marks=pytest.mark.slow)],
+    few(["--help", "doctor", "parity --quick --rungs 5"], "--help"),
 )
 def test_an_encoding_without_our_signs_is_enough(command, encoding, tmp_path):
     code, out, err = shell(f"MJ {command}", tmp_path, PYTHONIOENCODING=encoding)

@@ -213,6 +213,7 @@ def test_the_renderer_of_the_example_draws(scratch):
         renderer.render((0.0, 0.0, 0.0, 0.0))
 
 
+@pytest.mark.slow
 def test_the_task_of_the_example_is_learned_alike_by_both_engines(scratch):
     calm = scratch("a task").CALM
     try:

@@ -35,13 +35,8 @@ RIGHT_WITH_OTHER_NUMBERS = {
 }
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        name if name == "all doubled" else pytest.param(name, marks=pytest.mark.slow)
-        for name in RIGHT_WITH_OTHER_NUMBERS
-    ],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("name", RIGHT_WITH_OTHER_NUMBERS)
 def test_motion_and_numbers_have_verdicts_of_their_own(name, tmp_path, capsys):
     changes, said = RIGHT_WITH_OTHER_NUMBERS[name]
     path = tmp_path / "model.xml"

@@ -90,6 +90,7 @@ def test_one_seed_and_many_do_not_share_a_folder(here, capsys):
     assert {path: path.read_bytes() for path in here.rglob("*") if path.is_file()} == before
 
 
+@pytest.mark.slow
 def test_a_film_of_another_run_stays(here, capsys):
     Path("videos").mkdir()
     for name, film in (("a/run", "run"), ("b/run", "run-2"), ("c/run", "run-3")):

@@ -6,28 +6,27 @@ import pytest
 
 from command_line import call
 from mjcartpole.learning.checkpoints import LATEST
+from nightly import few
 from trainings import SHORT, contents
 
+REFUSED = [
+    (["--seed", "4"], ["--seed"]),
+    (["--episodes", "9", "--gamma", "0.5"], ["--episodes", "--gamma"]),
+    (["--bins", "1", "1", "2", "3"], ["--bins"]),
+    (["--td-lambda", "None"], ["--td-lambda"]),
+    (["--no-learn-last-step"], ["--learn-last-step"]),
+    (["--preset", "article"], ["--preset"]),
+    (["--backend", "gym"], ["--backend"]),
+    (["--model", "cartpole.xml"], ["--model"]),
+    (["--run-dir", "other"], ["--run-dir"]),
+    (["--overwrite"], ["--overwrite"]),
+    (["--seeds", "3"], ["--seeds"]),
+    (["--seeds", "3", "--overwrite", "--alpha", "0.2"], ["--alpha", "--overwrite", "--seeds"]),
+    (["--workers", "2"], ["--workers"]),
+]
 
-@pytest.mark.parametrize(
-    ("flags", "named"),
-    [
-        (["--seed", "4"], ["--seed"]),
-        (["--episodes", "9", "--gamma", "0.5"], ["--episodes", "--gamma"]),
-        (["--bins", "1", "1", "2", "3"], ["--bins"]),
-        (["--td-lambda", "None"], ["--td-lambda"]),
-        (["--no-learn-last-step"], ["--learn-last-step"]),
-        (["--preset", "article"], ["--preset"]),
-        (["--backend", "gym"], ["--backend"]),
-        (["--model", "cartpole.xml"], ["--model"]),
-        (["--run-dir", "other"], ["--run-dir"]),
-        (["--overwrite"], ["--overwrite"]),
-        (["--seeds", "3"], ["--seeds"]),
-        (["--seeds", "3", "--overwrite", "--alpha", "0.2"], ["--alpha", "--overwrite", "--seeds"]),
-        (["--workers", "2"], ["--workers"]),
-    ],
-    ids=" ".join,
-)
+
+@pytest.mark.parametrize(("flags", "named"), few(REFUSED, *REFUSED[::4]), ids=" ".join)
 def test_flags_that_a_resumed_run_would_ignore_are_refused(flags, named, killed, capsys):
     code, out, err = call(["train", "--resume", killed, *flags], capsys)
     assert (code, out, err.count("\n")) == (2, "", 1)

@@ -65,6 +65,7 @@ def test_each_seed_is_as_if_it_was_trained_alone(alone, capsys):
     assert f"mean {sum(means) / 3:.2f}, minimum {min(means):.2f}" in out
 
 
+@pytest.mark.slow
 def test_the_python_engine_in_processes_gives_the_same(alone):
     command = [sys.executable, "-m", "mjcartpole", *FEW, "--seeds", "3", "--workers", "2"]
     process = subprocess.run(
@@ -93,6 +94,7 @@ def test_seeds_that_are_killed_at_changes_of_the_file_system(stride, alone, fork
         assert_equal_seeds("many")
 
 
+@pytest.mark.slow
 def test_seeds_that_are_stopped_go_on(here, fork, capsys):
     config = ["--preset", "article-terminal", "--backend", "gym", "--episodes", "20000"]
     child = fork(["train", *config, "--seeds", "2", "--run-dir", "many"])

@@ -116,6 +116,7 @@ def test_policies_of_one_name_are_told_apart(policies, tmp_path):
     assert document["policies"] == [str(policies[0]), str(other)]
 
 
+@pytest.mark.slow
 def test_four_policies_on_six_models_take_less_than_a_minute(policies, tmp_path):
     # Untrained policies would end their episodes early; these 24 cells are the slowest there are.
     started = time.perf_counter()

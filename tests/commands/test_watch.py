@@ -121,6 +121,7 @@ def test_one_look(file, capsys):
     assert Path(f"videos/mine{SUFFIX}").stat().st_size > 1000
 
 
+@pytest.mark.slow
 def test_parity_holds_for_the_reference_and_is_beyond_for_the_rest(file, capsys):
     Watch(file, once=1, episodes=5, video=False).run()
     assert "parity    as the equations say (rung 2, 3, 4)" in capsys.readouterr().out
@@ -132,9 +133,8 @@ def test_parity_holds_for_the_reference_and_is_beyond_for_the_rest(file, capsys)
 SAVES = [LIGHT, BROKEN, REFERENCE, NO_CARTPOLE, LIGHT, "", "not XML", REFERENCE, LIGHT, BROKEN]
 
 
-@pytest.mark.parametrize(
-    "saves", [SAVES[:3], pytest.param(SAVES, marks=pytest.mark.slow)], ids=["three", "ten"]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("saves", [SAVES[:3], SAVES], ids=["three", "ten"])
 def test_edits_good_and_broken(saves, file, watch):
     watcher = watch(episodes=20)
     watcher.until("done")
@@ -183,6 +183,7 @@ def test_from_a_save_to_a_new_video(file, watch):
     assert watcher.end(signal.SIGTERM)[0] == 143
 
 
+@pytest.mark.slow
 def test_a_save_during_the_work_starts_over(file, watch):
     watcher = watch(episodes=1_000_000)
     watcher.until("parity")

@@ -22,8 +22,8 @@ from mjcartpole.studies.evaluation import evaluate
 from nightly import few
 
 
-@pytest.mark.parametrize("chunk", few([1, 7, 1_000, 10**9], 7, 10**9))
-@pytest.mark.parametrize("backend", ["mujoco", "gym"])
+@pytest.mark.parametrize("chunk", few([1, 7, 1_000, 10**9], 7))
+@pytest.mark.parametrize("backend", few(["mujoco", "gym"], "gym"))
 def test_the_length_of_chunks_changes_nothing(chunk, backend, monkeypatch):
     config = TrainConfig(backend=backend, episodes=120, seed=5)
     expected = outcome(config, "compiled")
@@ -134,7 +134,7 @@ def interrupted_training(backend):
     return training
 
 
-@pytest.mark.parametrize("backend", ["mujoco", "gym"])
+@pytest.mark.parametrize("backend", few(["mujoco", "gym"], "mujoco"))
 def test_ctrl_c_is_heard_between_chunks_and_nothing_is_torn(backend):
     """What was learned is what was logged: the same as a training that was left there."""
     found = interrupted_training(backend)

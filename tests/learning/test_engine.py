@@ -117,7 +117,12 @@ def test_where_numba_compiles_nothing_the_reference_loop_does_the_same():
             "ImportError('Numba needs NumPy 2.1 or less')",
             "Numba does not work: Numba needs NumPy 2.1 or less",
         ),
-        ("llvmlite", "OSError('Could not find libllvmlite')", "Numba does not work: "),
+        pytest.param(
+            "llvmlite",
+            "OSError('Could not find libllvmlite')",
+            "Numba does not work: ",
+            marks=pytest.mark.slow,
+        ),
     ],
 )
 def test_where_numba_cannot_be_imported_the_reference_loop_does_the_same(

@@ -219,7 +219,7 @@ FORKING = """
     [
         pytest.param("fork", "first", None, marks=pytest.mark.slow),
         ("fork", "before", "sketch"),  # the driver's threads are not in the copy
-        ("spawn", "before", None),
+        pytest.param("spawn", "before", None, marks=pytest.mark.slow),
     ],
 )
 def test_other_processes_draw(backend, tmp_path, method, when, expected):
@@ -358,6 +358,7 @@ def test_mujocos_own_renderer_beside_ours(backend, close):
     assert (done.returncode, done.stdout.strip(), done.stderr) == (0, backend, "")
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="counts in /proc")
 @pytest.mark.parametrize(
     "count", [10, pytest.param(100, marks=pytest.mark.slow)], ids=["few", "many"]

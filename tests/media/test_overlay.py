@@ -16,6 +16,7 @@ from mjcartpole.physics.load import load_model, models_folder
 
 DOCUMENT = (models_folder() / "cartpole.xml").read_text(encoding="utf-8")
 SIZES = [(320, 240), (640, 480), (1920, 1080)]
+LARGER = [pytest.param(size, marks=pytest.mark.slow) for size in SIZES[1:]]
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +50,7 @@ def strip_height(width, height):
     return len(Strip(width, height).pixels)
 
 
-@pytest.mark.parametrize("size", SIZES)
+@pytest.mark.parametrize("size", [SIZES[0], *LARGER])
 @pytest.mark.parametrize("x", [-2.4, 0.0, 1.1, 2.4])
 @pytest.mark.parametrize("action", [0, 1])
 def test_the_arrow_is_at_the_cart_and_points_where_the_push_goes(cartpole, size, x, action):

@@ -94,8 +94,9 @@ def run(code, kind, argument):
     return done.returncode, done.stderr
 
 
-@pytest.mark.parametrize("end", ["closed", pytest.param("left", marks=pytest.mark.slow)])
-@pytest.mark.parametrize("kind", few(KINDS, "egl"))
+@pytest.mark.slow
+@pytest.mark.parametrize("end", ["closed", "left"])
+@pytest.mark.parametrize("kind", KINDS)
 def test_threads_draw_with_one_environment_and_with_their_own(kind, end):
     assert run(TOGETHER, kind, end) == (0, "")
 

@@ -59,7 +59,7 @@ ENDLESS = """
 
 
 @pytest.mark.skipif(os.name == "nt", reason="kill ends a process without a word there")
-@pytest.mark.parametrize("name", ["run.mp4", "run.gif", "run.webp", "run"])
+@pytest.mark.parametrize("name", few(["run.mp4", "run.gif", "run.webp", "run"], "run.mp4"))
 @pytest.mark.parametrize(
     "number",
     few([signal.SIGTERM, signal.SIGINT, getattr(signal, "SIGHUP", 1)], signal.SIGTERM),
@@ -115,7 +115,7 @@ FULL = """
 
 @pytest.mark.skipif(os.name == "nt", reason="limits the size of files")
 @pytest.mark.parametrize("most", [30, 100_000], ids=["at once", "on the way"])
-@pytest.mark.parametrize("name", ["run.mp4", "run.gif", "run.webp", "run"])
+@pytest.mark.parametrize("name", few(["run.mp4", "run.gif", "run.webp", "run"], "run.mp4"))
 def test_where_there_is_no_room_the_old_file_stays(tmp_path, name, most):
     path = tmp_path / name
     write_video(path, frames(2))
@@ -150,9 +150,7 @@ GROWING = """
 @pytest.mark.parametrize(
     "count", [1000, pytest.param(20_000, marks=pytest.mark.slow)], ids=["short", "long"]
 )
-@pytest.mark.parametrize(
-    "name", few(["run.mp4", "run.gif", "run.webp", "run"], "run.mp4", "run.gif")
-)
+@pytest.mark.parametrize("name", few(["run.mp4", "run.gif", "run.webp", "run"], "run.mp4"))
 def test_memory_does_not_grow_with_the_length(tmp_path, name, count):
     command = [sys.executable, "-c", textwrap.dedent(GROWING), str(tmp_path / name), str(count)]
     done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=300)

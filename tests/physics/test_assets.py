@@ -179,7 +179,7 @@ LAYOUTS = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("case", few(LAYOUTS, *list(LAYOUTS)[::3]))
+@pytest.mark.parametrize("case", few(LAYOUTS, *list(LAYOUTS)[::6]))
 def test_the_stored_document_is_the_same_model_from_anywhere(case, tmp_path, monkeypatch):
     path = write(tmp_path / "here", LAYOUTS[case])
     monkeypatch.chdir(tmp_path)

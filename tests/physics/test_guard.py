@@ -14,6 +14,7 @@ from mjcartpole.errors import ModelError
 from mjcartpole.physics.guard import compile_document
 from mjcartpole.physics.includes import read_whole
 from mjcartpole.physics.load import load_model, model_names, models_folder, same_model
+from nightly import few
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="limits of Linux processes")
 
@@ -161,7 +162,11 @@ def assert_refused(path):
     assert max(own, childrens) < MEGABYTES
 
 
-@pytest.mark.parametrize("case", QUICK)
+FEW = ("memory", "wide texture", "overlapping bodies", "nested", "files")
+"""Of all that is refused, what differs most."""
+
+
+@pytest.mark.parametrize("case", few(QUICK, *FEW))
 def test_what_asks_for_too_much_is_refused(case, tmp_path):
     path = tmp_path / "main.xml"
     path.write_text(QUICK[case], encoding="utf-8")

@@ -362,6 +362,7 @@ def check(results: dict[int, str]) -> None:
     assert kinds["ModelError"] > len(results) / 50
 
 
+@pytest.mark.slow
 def test_60_mutated_files():
     results = run_many(0, 60)
     assert sorted(results) == list(range(60))

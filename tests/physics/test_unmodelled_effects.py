@@ -19,6 +19,7 @@ from mjcartpole.physics.unmodelled_effects import (
     idle_numbers,
     overridden_masses,
 )
+from nightly import few
 
 REFERENCE = load_model("cartpole").xml
 
@@ -228,7 +229,7 @@ def test_several_things_are_all_named():
     ]
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", few(range(12), 0, 7))
 def test_contacts_are_those_that_mujoco_finds(seed):
     """All geoms in one place: then every pair that MuJoCo lets through is a contact."""
     rng = np.random.default_rng(seed)

@@ -12,6 +12,7 @@ from mjcartpole.learning.training import Training, train
 from mjcartpole.physics.load import load_model
 from mjcartpole.studies.evaluation import evaluate
 from mjcartpole.studies.finish_training import evaluate_where_trained, finish_training
+from nightly import few
 
 CONFIG = TrainConfig(episodes=20, seed=6)
 CARTPOLE = load_model()
@@ -63,7 +64,7 @@ def test_a_training_that_was_stopped_is_written_and_not_evaluated(tmp_path):
     assert len((tmp_path / runs.EPISODES).read_text().splitlines()) == 8
 
 
-@pytest.mark.parametrize("stops", [(1,), (7,), (3, 11, 19), (20,)])
+@pytest.mark.parametrize("stops", few([[1], [7], [3, 11, 19], [20]], [3, 11, 19]))
 def test_a_training_that_was_stopped_ends_like_one_that_was_not(stops, tmp_path):
     conduct(tmp_path / "whole", engine="compiled")
     for number, stop in enumerate(stops):
@@ -72,6 +73,7 @@ def test_a_training_that_was_stopped_ends_like_one_that_was_not(stops, tmp_path)
     assert contents(tmp_path / "stopped") == contents(tmp_path / "whole")
 
 
+@pytest.mark.slow
 def test_results_that_a_kill_left_half_written_are_written_again(tmp_path):
     conduct(tmp_path)
     whole = contents(tmp_path)

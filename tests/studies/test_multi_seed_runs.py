@@ -14,6 +14,7 @@ from mjcartpole.studies import multi_seed_runs
 from mjcartpole.studies.evaluation import Evaluation
 from mjcartpole.studies.multi_seed import SeedRunner
 from mjcartpole.studies.seeds import ManyResult, SeedResult
+from nightly import few
 
 CONFIG = TrainConfig(episodes=5, backend="gym", seed=2)
 
@@ -165,7 +166,10 @@ def test_files_of_somebody_else_are_never_taken(names, overwrite, tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == names
 
 
-@pytest.mark.parametrize("left", [folders.LOCK, ".seeds-0123abcd.json", ".model-0123abcd.xml"])
+LEFT = [folders.LOCK, ".seeds-0123abcd.json", ".model-0123abcd.xml"]
+
+
+@pytest.mark.parametrize("left", few(LEFT, folders.LOCK))
 def test_what_a_kill_in_the_first_moment_leaves_is_no_obstacle(left, tmp_path):
     (tmp_path / left).write_text("")
     train_in(tmp_path)
@@ -183,7 +187,10 @@ def test_a_file_in_the_way(tmp_path):
         claim(tmp_path / "many")
 
 
-@pytest.mark.parametrize("text", ["", "{", "[]", "{}", '{"seeds": [1], "config": {"gamma": 9}}'])
+DAMAGED = ["", "{", "[]", "{}", '{"seeds": [1], "config": {"gamma": 9}}']
+
+
+@pytest.mark.parametrize("text", few(DAMAGED, *DAMAGED[::4]))
 def test_damaged_seeds_are_refused(text, tmp_path):
     train_in(tmp_path)
     (tmp_path / multi_seed_runs.SEEDS).write_text(text)
@@ -194,7 +201,7 @@ def test_damaged_seeds_are_refused(text, tmp_path):
         pass
 
 
-@pytest.mark.parametrize("seeds", [[], [1, 1], [-1], list(range(100_001))])
+@pytest.mark.parametrize("seeds", few([[], [1, 1], [-1], list(range(100_001))], [1, 1]))
 def test_seeds_are_held_to_their_limits_on_resume_and_overwrite(seeds, tmp_path):
     train_in(tmp_path)
     path = tmp_path / multi_seed_runs.SEEDS

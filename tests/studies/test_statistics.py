@@ -300,6 +300,7 @@ def test_the_improvement_interval_draws_both_sides():
         assert high >= 0.75
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", [(100,), (20, 3)])
 def test_intervals_are_quick(shape):
     scores = np.random.default_rng(0).normal(size=shape)

@@ -12,7 +12,7 @@ from nightly import few
 from parity_cases import POLE, WRONG, changed, climb, failures
 
 
-@pytest.mark.parametrize("height", few(["0", "1e-14", "1e-9", "1e-6", "-1e-7"], "0", "1e-9"))
+@pytest.mark.parametrize("height", few(["0", "1e-14", "1e-9", "1e-6", "-1e-7"], "1e-9"))
 def test_a_pole_that_is_balanced_on_its_hinge(height):
     text = changed((POLE, POLE.replace('"0 0 0.5"', f'"0 0 {height}"')))
     subject, results = climb(text, "itself", (2, 3, 4, 6, 9))
@@ -62,7 +62,8 @@ def rod(rng):
     )
 
 
-@pytest.mark.parametrize("seed", [*(pytest.param(n, marks=pytest.mark.slow) for n in range(5)), 5])
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(6))
 def test_random_rods_move_as_their_equations_and_gymnasiums_formula_do(seed):
     text = rod(np.random.default_rng([7, seed]))
     subject, results = climb(text, "itself", (2, 3, 4, 6, 7, 8, 9, 10))
@@ -102,14 +103,8 @@ FAR_FROM_THE_REFERENCE = [
 ]
 
 
-@pytest.mark.parametrize(
-    "edits",
-    [
-        *FAR_FROM_THE_REFERENCE[:2],
-        *(pytest.param(edits, marks=pytest.mark.slow) for edits in FAR_FROM_THE_REFERENCE[2:]),
-    ],
-    ids=",".join,
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("edits", FAR_FROM_THE_REFERENCE, ids=",".join)
 def test_extreme_but_right_models_move_as_their_equations_do(edits):
     cartpole = load_model("cartpole", edits, own_timestep=True)
     results = list(run_ladder(Subject(cartpole, "itself", quick=True), (1, 2, 3, 4, 5, 9)))
@@ -125,8 +120,10 @@ def test_what_the_equations_do_not_cover_is_named_and_not_passed(name):
     assert all(cause in result.skipped for result in results.values())
 
 
-@pytest.mark.parametrize("limits", ["", ' range="-1 1"'])
-@pytest.mark.parametrize("integrator", ["RK4", "implicit", "implicitfast", "discrete"])
+@pytest.mark.parametrize("limits", few(["", ' range="-1 1"'], ""))
+@pytest.mark.parametrize(
+    "integrator", few(["RK4", "implicit", "implicitfast", "discrete"], "RK4", "discrete")
+)
 def test_each_integrator_is_a_right_answer_to_the_question_about_itself(integrator, limits):
     text = changed(
         ('integrator="Euler"', f'integrator="{integrator}"'),

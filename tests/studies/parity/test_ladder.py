@@ -31,8 +31,8 @@ def test_the_reference_passes_the_full_ladder():
     assert [result.verdict for result in results] == ["holds"] * len(RUNGS)
 
 
-FEW = ("pole mass", "centre", "timestep", "slider axis", "friction", "contact", "integrator")
-"""Of all errors, one of each kind."""
+FEW = ("pole mass", "integrator")
+"""Of all errors, one in the numbers and one in the steps."""
 
 
 @functools.cache
