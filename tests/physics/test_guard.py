@@ -216,7 +216,7 @@ def test_what_is_honest_is_loaded(case, tmp_path):
     path = tmp_path / "main.xml"
     path.write_text(HONEST[case], encoding="utf-8")
     (tmp_path / "points.obj").write_text(points(3_000))
-    load_model(path)
+    assert load_model(path).poles == 1
 
 
 @pytest.mark.slow
@@ -235,7 +235,7 @@ def test_large_pictures_and_meshes_are_loaded(tmp_path):
 def test_our_own_models_are_not_tried_out(name, monkeypatch):
     monkeypatch.setenv("PATH", "")
     monkeypatch.setattr(sys, "executable", os.devnull)
-    load_model(name, {"gravity": 3})
+    assert load_model(name, {"gravity": 3}).model.opt.gravity[2] == -3
 
 
 def test_a_document_is_tried_out_once(monkeypatch):

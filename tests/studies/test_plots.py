@@ -114,3 +114,5 @@ def test_a_task_without_a_threshold_has_no_line_and_holds_nowhere():
 def test_few_values_can_be_drawn(means, tmp_path):
     write_plot(curves(swept(*means)), tmp_path / "few.png")
     write_plot(heat_map(matrix(*means)), tmp_path / "few.svg")
+    assert (tmp_path / "few.png").read_bytes().startswith(b"\x89PNG")
+    assert "</svg>" in (tmp_path / "few.svg").read_text(encoding="utf-8")

@@ -46,9 +46,6 @@ except Exception as error:
 BALANCE: Final = "balance"
 """What dm_control's suite calls the task that is CartPole-v1."""
 
-TIME_LIMIT: Final = CARTPOLE_V1.time_limit * CONTROL_STEP
-"""Seconds."""
-
 HIGHLIGHT: Final = (0.0, 0.5, 0.3)
 """What poles look like at reward 1, where rewards are to be seen: the suite's own colour."""
 
