@@ -231,17 +231,15 @@ class Balance(control.Task):  # type: ignore[misc]
 
     def get_reward(self, physics: Physics) -> float:
         """Return the task's reward: of CartPole-v1, 1 for every step."""
-        state = worst_pole(physics.state.tolist())
-        return self._rules.reward(*state, self._has_ended(state))
+        x, x_dot, theta, theta_dot = worst_pole(physics.state.tolist())
+        return self._rules.reward(x, x_dot, theta, theta_dot, self._rules.has_ended(x, theta))
 
     def get_termination(self, physics: Physics) -> float | None:
         """Return the discount of the step that ends an episode; None while it goes on."""
-        if self._has_ended(worst_pole(physics.state.tolist())):
+        x, _, theta, _ = worst_pole(physics.state.tolist())
+        if self._rules.has_ended(x, theta):
             return 0.0
         return 1.0 if self.steps >= self._limit else None
-
-    def _has_ended(self, state: tuple[float, float, float, float]) -> bool:
-        return self._rules.has_ended(state[0], state[2])
 
     def _show_reward(self, physics: Physics) -> None:
         if self._visualize_reward:

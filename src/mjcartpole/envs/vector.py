@@ -327,10 +327,10 @@ class CartPoleVectorEnv(
 
     def _rewards(self, terminations: npt.NDArray[np.bool_]) -> npt.NDArray[np.float32]:
         reward = self._task.reward
-        constant = CONSTANT.get(reward)
-        if constant is not None:
-            rewards = np.full(self.num_envs, constant, dtype=np.float32)
-            rewards[terminations] = reward(0.0, 0.0, 0.0, 0.0, True)
+        if reward in CONSTANT:
+            rewards = np.full(self.num_envs, CONSTANT[reward], dtype=np.float32)
+            if terminations.any():
+                rewards[terminations] = reward(0.0, 0.0, 0.0, 0.0, True)
             return rewards
         pairs = zip(self._simulation.state.tolist(), terminations.tolist(), strict=True)
         values = [reward(*worst_pole(state), over) for state, over in pairs]
