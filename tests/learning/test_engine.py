@@ -34,6 +34,16 @@ TRAININGS = """
         }
     print(json.dumps(found))
 """
+LINEAR_ALGEBRA = """
+    import sys
+    import numpy as np
+    import mjcartpole
+    mjcartpole.train(mjcartpole.TrainConfig(episodes=1))
+    assert "scipy" not in sys.modules
+    import numba
+    solve = numba.njit(lambda a, b: np.linalg.solve(a, b) @ np.ones(2))
+    print(solve(np.diag([2.0, 4.0]), np.eye(2)))
+"""
 WARNING = "mjcartpole WARNING the compiled engine cannot run here (%s"
 
 
@@ -83,6 +93,12 @@ def test_the_compiled_engine_runs_where_it_can(caplog):
             assert Training(config).engine == "compiled"
             assert Training(config, engine="python").engine == "python"
     assert not caplog.records
+
+
+@pytest.mark.slow
+def test_what_others_compile_finds_scipy_when_it_needs_it():
+    code = [sys.executable, "-c", textwrap.dedent(LINEAR_ALGEBRA)]
+    assert subprocess.check_output(code, text=True, timeout=120).split() == ["[0.5", "0.25]"]
 
 
 @pytest.mark.parametrize("engine", ["cython", "", "Compiled"])
