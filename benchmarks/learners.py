@@ -19,8 +19,8 @@ import numpy as np
 
 from mjcartpole.cores import available_cores
 from mjcartpole.learning.config import PRESETS, TrainConfig
+from mjcartpole.learning.evaluation import evaluate
 from mjcartpole.learning.training import train
-from mjcartpole.studies.evaluation import evaluate
 
 # What was tried around `tuned`: each entry changes its defaults.
 ONE_STEP = {

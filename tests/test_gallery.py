@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from mjcartpole.learning.config import TrainConfig
+from mjcartpole.learning.evaluation import evaluate
 from mjcartpole.physics.edit.edits import describe_edits, edit_document
 from mjcartpole.physics.load import load_model, model_names, models_folder, same_model
 from mjcartpole.physics.simulation import Simulation
 from mjcartpole.physics.unmodelled_effects import differs_from
-from mjcartpole.studies.evaluation import evaluate
 from mjcartpole.studies.parity import Subject, run_ladder
 from nightly import few
 

@@ -18,10 +18,10 @@ from mjcartpole.envs.vector import CartPoleVectorEnv
 from mjcartpole.errors import ConfigError, SimulationError
 from mjcartpole.learning import runs
 from mjcartpole.learning.config import TrainConfig
+from mjcartpole.learning.evaluation import evaluate
 from mjcartpole.learning.training import Training, train
 from mjcartpole.physics.load import load_model
 from mjcartpole.physics.simulation import Simulation
-from mjcartpole.studies.evaluation import evaluate
 from mjcartpole.studies.film import Film, PolicySetup, play
 from mjcartpole.studies.transfer import transfer
 from mjcartpole.studies.video_options import VideoOptions

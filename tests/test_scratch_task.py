@@ -16,8 +16,8 @@ from mjcartpole.envs.backend import make_env
 from mjcartpole.envs.registration import env_id
 from mjcartpole.errors import ConfigError
 from mjcartpole.learning.config import TrainConfig
+from mjcartpole.learning.evaluation import evaluate
 from mjcartpole.learning.training import train
-from mjcartpole.studies.evaluation import evaluate
 from mjcartpole.studies.film import PolicySetup, play
 from mjcartpole.task import TASKS, Task
 

@@ -21,12 +21,12 @@ if TYPE_CHECKING:
     from mjcartpole.envs.cartpole import CartPoleEnv
     from mjcartpole.envs.vector import CartPoleVectorEnv
     from mjcartpole.learning.config import TrainConfig
+    from mjcartpole.learning.evaluation import Evaluation, evaluate
     from mjcartpole.learning.policy import Policy
     from mjcartpole.learning.training import TrainResult, train
     from mjcartpole.physics.cartpole import CartPole
     from mjcartpole.physics.load import load_model, model_names
     from mjcartpole.physics.simulation import Simulation
-    from mjcartpole.studies.evaluation import Evaluation, evaluate
     from mjcartpole.studies.multi_seed import train_many
     from mjcartpole.studies.seeds import ManyResult
 
@@ -56,13 +56,13 @@ _HOMES = {
     "CartPole": "physics.cartpole",
     "CartPoleEnv": "envs.cartpole",
     "CartPoleVectorEnv": "envs.vector",
-    "Evaluation": "studies.evaluation",
+    "Evaluation": "learning.evaluation",
     "ManyResult": "studies.seeds",
     "Policy": "learning.policy",
     "Simulation": "physics.simulation",
     "TrainConfig": "learning.config",
     "TrainResult": "learning.training",
-    "evaluate": "studies.evaluation",
+    "evaluate": "learning.evaluation",
     "load_model": "physics.load",
     "model_names": "physics.load",
     "train": "learning.training",

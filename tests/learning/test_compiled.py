@@ -16,9 +16,9 @@ from mjcartpole.errors import SimulationError
 from mjcartpole.learning import compiled
 from mjcartpole.learning.compiled import CompiledLoop
 from mjcartpole.learning.config import TrainConfig
+from mjcartpole.learning.evaluation import evaluate
 from mjcartpole.learning.training import Training, train
 from mjcartpole.physics.load import load_model
-from mjcartpole.studies.evaluation import evaluate
 from nightly import few
 
 

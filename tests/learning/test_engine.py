@@ -12,15 +12,15 @@ import pytest
 from mjcartpole.errors import ConfigError
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.engine import choose_engine
+from mjcartpole.learning.evaluation import evaluate
 from mjcartpole.learning.training import Training, train
-from mjcartpole.studies.evaluation import evaluate
 
 TRAININGS = """
     import hashlib, json, logging, sys
     logging.basicConfig(level=logging.INFO, format="%(name)s %(levelname)s %(message)s")
     from mjcartpole.learning.config import TrainConfig
     from mjcartpole.learning.training import Training, train
-    from mjcartpole.studies.evaluation import evaluate
+    from mjcartpole.learning.evaluation import evaluate
     found = {}
     for backend in ("mujoco", "gym"):
         config = TrainConfig(backend=backend, episodes=30, seed=2)

@@ -20,10 +20,10 @@ from engines import (
 )
 from mjcartpole.errors import SimulationError
 from mjcartpole.learning.config import PRESETS, TrainConfig
+from mjcartpole.learning.evaluation import evaluate
 from mjcartpole.learning.methods import METHODS
 from mjcartpole.learning.training import train
 from mjcartpole.physics.load import load_model
-from mjcartpole.studies.evaluation import evaluate
 from nightly import examples, few
 
 RUBBING = ('damping="0" frictionloss="0"', 'damping="0.2" frictionloss="0.05"')

@@ -12,9 +12,9 @@ import pytest
 from mjcartpole.errors import ModelNotFoundError
 from mjcartpole.learning import compiled, training
 from mjcartpole.learning.config import PRESETS, TrainConfig
+from mjcartpole.learning.evaluation import evaluate
 from mjcartpole.learning.training import Training, train
 from mjcartpole.physics.load import load_model
-from mjcartpole.studies.evaluation import evaluate
 
 ENGINES = ("python", "compiled")
 

@@ -11,12 +11,12 @@ import pytest
 from mjcartpole.errors import ConfigError, RenderError
 from mjcartpole.learning.discretizer import Discretizer
 from mjcartpole.learning.episodes import Episode
+from mjcartpole.learning.evaluation import SEED, evaluate
 from mjcartpole.learning.policy import Policy
 from mjcartpole.media.montage import state_at
 from mjcartpole.media.overlay import Overlay
 from mjcartpole.media.renderer import open_renderer
 from mjcartpole.physics.load import load_model
-from mjcartpole.studies.evaluation import SEED, evaluate
 from mjcartpole.studies.film import Film, PolicySetup, Rollout, play
 from mjcartpole.studies.video_options import FALL_SECONDS, FALL_SPEED, VideoOptions
 from mjcartpole.task import CONTROL_STEP

@@ -7,10 +7,10 @@ import pytest
 from mjcartpole.learning import runs
 from mjcartpole.learning.checkpoints import LATEST, load_checkpoint
 from mjcartpole.learning.config import TrainConfig
+from mjcartpole.learning.evaluation import evaluate
 from mjcartpole.learning.session import Session
 from mjcartpole.learning.training import Training, train
 from mjcartpole.physics.load import load_model
-from mjcartpole.studies.evaluation import evaluate
 from mjcartpole.studies.finish_training import evaluate_where_trained, finish_training
 from nightly import few
 

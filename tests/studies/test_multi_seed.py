@@ -11,11 +11,11 @@ import pytest
 from mjcartpole.cores import available_cores
 from mjcartpole.errors import ConfigError, ModelError, RunError
 from mjcartpole.learning.config import TrainConfig
+from mjcartpole.learning.evaluation import evaluate
 from mjcartpole.learning.policy import Policy
 from mjcartpole.learning.training import train
 from mjcartpole.physics.load import load_model
 from mjcartpole.studies import multi_seed
-from mjcartpole.studies.evaluation import evaluate
 from mjcartpole.studies.multi_seed import SeedRunner, train_many
 from nightly import few
 

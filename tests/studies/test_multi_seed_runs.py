@@ -9,9 +9,9 @@ from mjcartpole.errors import FileError, RunError
 from mjcartpole.learning import documents, folders, runs
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.episodes import Episode
+from mjcartpole.learning.evaluation import Evaluation
 from mjcartpole.physics.load import load_model, same_model
 from mjcartpole.studies import multi_seed_runs
-from mjcartpole.studies.evaluation import Evaluation
 from mjcartpole.studies.multi_seed import SeedRunner
 from mjcartpole.studies.seeds import ManyResult, SeedResult
 from nightly import few

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from mjcartpole.learning.episodes import Episode
+from mjcartpole.learning.evaluation import Evaluation
 from mjcartpole.media.palette import CURVES, MISSING
 from mjcartpole.media.plots import css, write_plot
-from mjcartpole.studies.evaluation import Evaluation
 from mjcartpole.studies.plots import curves, heat_map
 from mjcartpole.studies.statistics import Interval
 from mjcartpole.studies.sweep import SweepResult

@@ -8,11 +8,11 @@ import pytest
 
 from mjcartpole.errors import ConfigError, ModelError
 from mjcartpole.learning.discretizer import Discretizer
+from mjcartpole.learning.evaluation import evaluate
 from mjcartpole.learning.policy import Policy
 from mjcartpole.physics.edit.edits import edit_document
 from mjcartpole.physics.load import load_model
 from mjcartpole.studies import sweep as module
-from mjcartpole.studies.evaluation import evaluate
 from mjcartpole.studies.sweep import Stretch, SweepResult, parse_sweep, sweep
 from mjcartpole.studies.transfer import Cell, TransferResult
 

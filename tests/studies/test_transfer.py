@@ -8,9 +8,9 @@ import pytest
 
 from mjcartpole.errors import ConfigError, ModelError, ModelNotFoundError
 from mjcartpole.learning.discretizer import Discretizer
+from mjcartpole.learning.evaluation import evaluate
 from mjcartpole.learning.policy import Policy
 from mjcartpole.physics.load import load_model
-from mjcartpole.studies.evaluation import evaluate
 from mjcartpole.studies.transfer import Place, find_place, transfer
 
 

@@ -9,7 +9,7 @@ import tyro
 
 from mjcartpole.commands.options import Command, EvalTarget, Included
 from mjcartpole.commands.printing import counted, print_evaluation, print_seeds
-from mjcartpole.studies.evaluation import EPISODES, Evaluation, evaluate
+from mjcartpole.learning.evaluation import EPISODES, Evaluation, evaluate
 
 if TYPE_CHECKING:
     from mjcartpole.studies.film import PolicySetup

@@ -7,13 +7,13 @@ from mjcartpole.commands.options import EvalTarget
 from mjcartpole.envs.backend import check_backend
 from mjcartpole.errors import ConfigError, RunError
 from mjcartpole.files import is_file
-from mjcartpole.learning import runs
+from mjcartpole.learning import evaluation, runs
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.documents import read_summary
 from mjcartpole.learning.policy import Policy
 from mjcartpole.physics.load import ModelLike, load_model
 from mjcartpole.physics.simulation import silence_mujoco
-from mjcartpole.studies import evaluation, multi_seed_runs
+from mjcartpole.studies import multi_seed_runs
 from mjcartpole.studies.film import PolicySetup
 from mjcartpole.task import task_named
 

@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from mjcartpole.studies.evaluation import Evaluation
+    from mjcartpole.learning.evaluation import Evaluation
     from mjcartpole.studies.seeds import ManyResult
 
 

@@ -15,8 +15,8 @@ from mjcartpole.commands.options import (
 from mjcartpole.commands.printing import counted
 from mjcartpole.errors import FileError, RenderError
 from mjcartpole.files import check_free, check_writable
+from mjcartpole.learning.evaluation import check_count
 from mjcartpole.signals import StopSignals
-from mjcartpole.studies.evaluation import check_count
 from mjcartpole.studies.video_options import VideoOptions
 
 if TYPE_CHECKING:

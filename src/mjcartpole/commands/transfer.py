@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 from mjcartpole.commands.options import Command, EvalTarget, OutputPath, Policies
 from mjcartpole.errors import ConfigError
 from mjcartpole.integrator import Integrator
+from mjcartpole.learning.evaluation import EPISODES, SEED
 from mjcartpole.learning.policy import Policy
-from mjcartpole.studies.evaluation import EPISODES, SEED
 
 if TYPE_CHECKING:
     from mjcartpole.studies.film import PolicySetup

@@ -14,12 +14,12 @@ from mjcartpole.commands.watched_file import POLL, SavedAgainError, Watched
 from mjcartpole.errors import MjCartPoleError
 from mjcartpole.files import atomic_write
 from mjcartpole.learning.config import TrainConfig
+from mjcartpole.learning.evaluation import Evaluation, evaluate
 from mjcartpole.learning.training import Training, TrainResult
 from mjcartpole.media.renderer import open_renderer
 from mjcartpole.output import stdout_problem
 from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.signals import StopSignals
-from mjcartpole.studies.evaluation import Evaluation, evaluate
 from mjcartpole.studies.film import PolicySetup, play
 from mjcartpole.studies.parity import Result, Subject, run_ladder
 from mjcartpole.studies.video_options import VideoOptions

@@ -13,6 +13,7 @@ import numpy.typing as npt
 from mjcartpole.envs.backend import Backend, make_env
 from mjcartpole.integrator import Integrator
 from mjcartpole.learning.episodes import ENDINGS, Episode
+from mjcartpole.learning.evaluation import SEED, check_count
 from mjcartpole.learning.loop import play_episode
 from mjcartpole.learning.policy import Policy
 from mjcartpole.media.hud import Moment
@@ -21,7 +22,6 @@ from mjcartpole.media.overlay import Overlay
 from mjcartpole.media.renderer import Renderer, open_renderer
 from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.load import ModelLike, load_model
-from mjcartpole.studies.evaluation import SEED, check_count
 from mjcartpole.studies.video_options import VideoOptions
 from mjcartpole.task import CARTPOLE_V1, N_ACTIONS, Task, worst_pole
 

@@ -9,11 +9,11 @@ from mjcartpole.learning import runs, tensorboard
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.documents import read_summary
 from mjcartpole.learning.engine import Engine
+from mjcartpole.learning.evaluation import Evaluation, evaluate
 from mjcartpole.learning.policy import Policy
 from mjcartpole.learning.session import Session
 from mjcartpole.learning.training import TrainResult
 from mjcartpole.physics.cartpole import CartPole
-from mjcartpole.studies.evaluation import Evaluation, evaluate
 
 
 def finish_training(

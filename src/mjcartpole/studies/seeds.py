@@ -9,8 +9,8 @@ from typing import Final
 
 from mjcartpole.errors import ConfigError
 from mjcartpole.learning.config import TrainConfig
+from mjcartpole.learning.evaluation import Evaluation
 from mjcartpole.learning.training import TrainResult
-from mjcartpole.studies.evaluation import Evaluation
 from mjcartpole.studies.statistics import Aggregate, aggregate
 
 MAX_SEEDS: Final = 100_000

@@ -11,10 +11,10 @@ import numpy.typing as npt
 
 from mjcartpole.errors import ConfigError
 from mjcartpole.integrator import Integrator
+from mjcartpole.learning.evaluation import EPISODES, SEED, check_count
 from mjcartpole.learning.policy import Policy
 from mjcartpole.physics.edit.edits import edits_of
 from mjcartpole.physics.load import Edits, ModelLike, load_model
-from mjcartpole.studies.evaluation import EPISODES, SEED, check_count
 from mjcartpole.studies.transfer import GYM, Cell, TransferResult, find_place, transfer
 from mjcartpole.task import CARTPOLE_V1, Task
 

@@ -12,10 +12,10 @@ from mjcartpole.cores import worker_count
 from mjcartpole.envs.backend import Backend
 from mjcartpole.errors import ConfigError, MjCartPoleError
 from mjcartpole.integrator import Integrator
+from mjcartpole.learning.evaluation import EPISODES, SEED, Evaluation, check_count, evaluate
 from mjcartpole.learning.policy import Policy
 from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.load import Edits, ModelLike, load_model
-from mjcartpole.studies.evaluation import EPISODES, SEED, Evaluation, check_count, evaluate
 from mjcartpole.studies.statistics import Interval, bootstrap_interval
 from mjcartpole.task import CARTPOLE_V1, Task, resolve
 

@@ -10,9 +10,9 @@ from scipy import stats
 
 from mjcartpole.cores import worker_count
 from mjcartpole.learning.config import TrainConfig
+from mjcartpole.learning.evaluation import SEED
 from mjcartpole.learning.loop import play_episode
 from mjcartpole.learning.training import Training
-from mjcartpole.studies.evaluation import SEED
 from mjcartpole.studies.parity.case import Subject, Vector
 from mjcartpole.studies.parity.result import Figure, Question, Result
 

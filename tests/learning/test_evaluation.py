@@ -4,8 +4,8 @@ import pytest
 
 from mjcartpole.errors import ConfigError, ModelNotFoundError
 from mjcartpole.learning.config import TrainConfig
+from mjcartpole.learning.evaluation import evaluate
 from mjcartpole.learning.training import train
-from mjcartpole.studies.evaluation import evaluate
 
 
 def steady(observation):
