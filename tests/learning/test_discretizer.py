@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from mjcartpole.errors import ConfigError
 from mjcartpole.learning.config import TrainConfig
-from mjcartpole.learning.discretizer import Discretizer, Grid, row_of
+from mjcartpole.learning.discretizer import UNFOLDED, Discretizer, Grid, row_of
 
 TUNED = TrainConfig().discretizer()
 anything = st.floats(allow_nan=False)
@@ -60,13 +60,13 @@ def test_one_bin_ignores_a_dimension():
 
 def test_the_grid_holds_the_dimensions_that_are_used():
     grid = Discretizer((1, 4, 1, 3), (-9.0, -1.0, -9.0, 0.0), (9.0, 1.0, 9.0, 6.0)).grid
-    assert grid == Grid((1, 3), (4, 3), (-1.0, 0.0), (1.0, 6.0), (0.5, 2.0))
+    assert grid == Grid((1, 3), (4, 3), (-1.0, 0.0), (1.0, 6.0), (0.5, 2.0), UNFOLDED)
     assert row_of([99.0, 0.6, 99.0, 2.0], grid) == 3 * 3 + 1
 
 
 def test_without_any_bins_all_is_one_row():
     discretizer = Discretizer((1, 1), (0.0, 0.0), (1.0, 1.0))
-    assert discretizer.grid == Grid((), (), (), (), ())
+    assert discretizer.grid == Grid((), (), (), (), (), UNFOLDED)
     assert discretizer([math.inf, -5.0]) == 0
 
 
@@ -77,6 +77,46 @@ def test_rounding_lifts_nothing_into_a_bin_that_is_not_there():
             discretizer = Discretizer((n,), (low,), (high,))
             assert discretizer([math.nextafter(high, low)]) == n - 1
             assert discretizer([low]) == 0
+
+
+@given(
+    st.tuples(*[st.integers(1, 7)] * 4),
+    st.lists(st.floats(-3, 3), min_size=4, max_size=4),
+)
+def test_a_mirror_image_has_the_same_row_and_the_other_hand(bins, values):
+    ends = (1.0, 2.0, 0.3, 1.5)
+    mirrored = Discretizer(bins, tuple(-end for end in ends), ends, mirror=True)
+    edges = [np.linspace(-end, end, n + 1) for n, end in zip(bins, ends, strict=True)]
+    on_edges = any(
+        np.isclose(value, edge, atol=1e-9).any() for value, edge in zip(values, edges, strict=True)
+    )
+    row, flipped = mirrored.folded(values)
+    assert 0 <= row < mirrored.n_learned
+    if not on_edges:
+        other, other_flipped = mirrored.folded([-value for value in values])
+        in_the_middle = mirrored(values) == mirrored([-value for value in values])
+        assert other == row
+        assert (other_flipped != flipped) or in_the_middle
+    plain = Discretizer(bins, mirrored.low, mirrored.high)
+    assert plain.folded(values) == (plain(values), False)
+
+
+@pytest.mark.parametrize("bins", [(2, 3), (3, 3), (1, 1), (4, 1)])
+def test_what_half_a_table_says_of_the_whole(bins):
+    discretizer = Discretizer(bins, (-1.0, -1.0), (1.0, 1.0), mirror=True)
+    learned = np.arange(2.0 * discretizer.n_learned).reshape(-1, 2)
+    table = discretizer.unfolded(learned)
+    assert table.shape == (discretizer.n_states, 2)
+    for values in np.random.default_rng(0).uniform(-1, 1, (50, 2)).tolist():
+        row, flipped = discretizer.folded(values)
+        expected = learned[row][::-1] if flipped else learned[row]
+        assert table[discretizer(values)].tolist() == expected.tolist()
+
+
+def test_a_grid_that_is_not_symmetric_has_no_mirror():
+    assert Discretizer((2, 1), (-1.0, -1.0), (1.0, 3.0), mirror=True).n_learned == 1
+    with pytest.raises(ConfigError, match=r"as long to the left as to the right; -1.0 to 3.0"):
+        Discretizer((2, 2), (-1.0, -1.0), (1.0, 3.0), mirror=True)
 
 
 def test_the_same_grid_is_an_equal_discretizer():

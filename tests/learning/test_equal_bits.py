@@ -94,6 +94,8 @@ def configs(draw):
     schedules = st.sampled_from([0.0, 0.01, 0.1, 1.0]) | fractions
     low = draw(st.tuples(*[st.floats(-3, 0)] * 4))
     width = draw(st.tuples(*[st.floats(1e-3, 5)] * 4))
+    mirror = draw(st.booleans())
+    high = tuple(a + b for a, b in zip(low, width, strict=True))
     q_init = sorted(draw(st.tuples(*[st.sampled_from([0.0, 1.0, 60.0]) | st.floats(-99, 99)] * 2)))
     physics = draw(st.sampled_from([("gym", "gym"), ("mujoco", "gym"), ("mujoco", "mujoco")]))
     return TrainConfig(
@@ -102,8 +104,9 @@ def configs(draw):
         episodes=draw(st.integers(1, 40)),
         seed=draw(st.integers(0, 9) | st.integers(0, 2**70)),
         bins=draw(st.tuples(*[st.sampled_from([1, 1, 2, 3, 8]) | st.integers(1, 30)] * 4)),
-        low=low,
-        high=tuple(a + b for a, b in zip(low, width, strict=True)),
+        low=tuple(-each for each in width) if mirror else low,
+        high=width if mirror else high,
+        mirror=mirror,
         gamma=draw(st.sampled_from([0.0, 0.95, 1.0]) | fractions),
         alpha=draw(schedules),
         alpha_final=draw(schedules),

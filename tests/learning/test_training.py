@@ -9,7 +9,7 @@ import gymnasium
 import numpy as np
 import pytest
 
-from mjcartpole.errors import ModelNotFoundError
+from mjcartpole.errors import ConfigError, ModelNotFoundError
 from mjcartpole.learning import compiled, training
 from mjcartpole.learning.config import PRESETS, TrainConfig
 from mjcartpole.learning.evaluation import evaluate
@@ -182,6 +182,34 @@ def test_a_training_can_be_set_back(short_chunks):
         for _ in training.run():
             pass
         assert content(training.snapshot())[:-1] == first
+
+
+def test_a_mirrored_training_learns_a_table_that_is_its_own_mirror_image():
+    result = train(TrainConfig(episodes=60, mirror=True, q_init_low=0.0))
+    table = result.q_table.reshape(-1, 2)
+    assert (table == table[::-1, ::-1]).all()
+    assert len(np.unique(table)) > 40
+    assert not result.policy.discretizer.mirror
+
+
+def test_a_mirrored_step_is_learned_for_its_image():
+    # One bin per sign of the angle: to the left of upright, and its mirror image.
+    grid = {"bins": (1, 1, 2, 1), "q_init_low": 0.0, "q_init_high": 0.0}
+    config = TrainConfig(episodes=1, mirror=True, td_lambda=None, alpha=0.5, decay=0.0, **grid)
+    training = Training(config)
+    list(training.run())
+    (episode,) = training.log
+    assert episode.steps > 5
+    fallen, upright = training.result().q_table.reshape(2, 2).tolist()
+    assert fallen == upright[::-1]
+    assert max(fallen) > 0
+
+
+@pytest.mark.parametrize("engine", ["compiled", "python"])
+def test_what_is_not_symmetric_has_no_mirror(engine):
+    with pytest.raises(ConfigError, match="wind does not: pushed to the right from upright rest"):
+        Training(TrainConfig(model="wind", mirror=True), engine=engine)
+    assert Training(TrainConfig(backend="gym", mirror=True), engine=engine).learner.p.gamma == 0.98
 
 
 def test_an_environment_of_ones_own_is_trained_on():

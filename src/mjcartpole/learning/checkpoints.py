@@ -122,7 +122,7 @@ def load_checkpoint(
     Raises:
         CheckpointError: It is not there, damaged, or of another training.
     """
-    memory = Learner(config, config.discretizer(poles).n_states).memory
+    memory = Learner(config, config.discretizer(poles).n_learned).memory
     most = sum(array.nbytes for array in memory) + config.episodes * _EPISODE_BYTES + _FRAME
     with opened(path, most, refusal=CheckpointError) as file:
         if not (line := file.readline(_LINE_LENGTH)).startswith(_HEAD):

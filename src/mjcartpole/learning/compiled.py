@@ -248,6 +248,7 @@ def _arrays(grid: Grid) -> Grid:
         np.array(grid.low, np.float64),
         np.array(grid.high, np.float64),
         np.array(grid.width, np.float64),
+        grid.folding,
     )
 
 

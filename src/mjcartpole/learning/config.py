@@ -123,6 +123,8 @@ class TrainConfig:
     """Lower ends of the bins' ranges; what lies outside belongs to the edge bins."""
     high: tuple[float, ...] = (2.4, 0.75, 0.2095, 1.5)
     """Upper ends of the bins' ranges."""
+    mirror: bool = False
+    """Learn of each state and action what their mirror images teach: left and right are alike."""
     log_every: int = 150
     """Episodes per row of the printed table."""
 
@@ -238,7 +240,7 @@ class TrainConfig:
                     f"give {_DIMENSIONS}{also} ({', '.join(state_names(poles))})"
                 )
         bins, low, high = (_for_each_pole(getattr(self, name), poles) for name in _GRID)
-        return Discretizer(bins, low, high)
+        return Discretizer(bins, low, high, self.mirror)
 
     @property
     def _most_poles(self) -> int:

@@ -4,7 +4,7 @@ import math
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple, TypeAlias
+from typing import Final, NamedTuple, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +14,8 @@ from mjcartpole.errors import ConfigError
 MAX_STATES = 1_000_000
 """More rows than anybody can visit; a table beyond this is taken for a slip of the finger."""
 
+UNFOLDED: Final = 2**62
+"""More states than any grid has: none of its rows stands for another one."""
 
 Ints: TypeAlias = Sequence[int] | npt.NDArray[np.int64]
 Floats: TypeAlias = Sequence[float] | npt.NDArray[np.float64]
@@ -29,6 +31,8 @@ class Grid(NamedTuple):
     high: Floats
     width: Floats
     """Of one bin."""
+    folding: int
+    """How many states are folded in half, see `folded`; `UNFOLDED` where none are."""
 
 
 def row_of(values: Sequence[float], grid: Grid) -> int:
@@ -46,6 +50,17 @@ def row_of(values: Sequence[float], grid: Grid) -> int:
     return row
 
 
+def folded(row: int, folding: int) -> tuple[int, bool]:
+    """Return the row that stands for a state and its mirror image, and whether it is the image's.
+
+    In a grid that is symmetric about 0 the mirror image of the first row is the last one, that of
+    the second the last but one; Numba compiles this as it is.
+    """
+    if 2 * row >= folding:
+        return folding - 1 - row, True
+    return row, False
+
+
 @dataclass(frozen=True)
 class Discretizer:
     """A regular grid over the observation.
@@ -57,12 +72,14 @@ class Discretizer:
         bins: Number of bins per dimension, shape (d,).
         low: Lower end of the grid per dimension (m, m/s, rad, rad/s).
         high: Upper end.
+        mirror: Whether a learner takes a state and its mirror image for the same one.
         grid: The same for `row_of`.
     """
 
     bins: tuple[int, ...]
     low: tuple[float, ...]
     high: tuple[float, ...]
+    mirror: bool = False
     grid: Grid = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -72,12 +89,18 @@ class Discretizer:
         low = tuple(float(self.low[dimension]) for dimension in used)
         high = tuple(float(self.high[dimension]) for dimension in used)
         width = tuple((b - a) / n for n, a, b in zip(bins, low, high, strict=True))
-        object.__setattr__(self, "grid", Grid(used, bins, low, high, width))
+        folding = self.n_states if self.mirror else UNFOLDED
+        object.__setattr__(self, "grid", Grid(used, bins, low, high, width, folding))
 
     @property
     def n_states(self) -> int:
         """Number of rows."""
         return math.prod(self.bins)
+
+    @property
+    def n_learned(self) -> int:
+        """Number of rows that a learner needs: with `mirror` half of all, and the middle one."""
+        return -(-self.n_states // 2) if self.mirror else self.n_states
 
     def __call__(self, values: Sequence[float]) -> int:
         """Row of an observation, counted as in a C-ordered array of shape `bins`.
@@ -86,6 +109,19 @@ class Discretizer:
             values: The observation as plain floats, shape (d,).
         """
         return row_of(values, self.grid)
+
+    def folded(self, values: Sequence[float]) -> tuple[int, bool]:
+        """Return a learner's row of an observation, and whether left is right there."""
+        return folded(row_of(values, self.grid), self.grid.folding)
+
+    def unfolded(self, learned: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        """Return the values of both actions in all states, shape (n_states, 2), from those learned.
+
+        Args:
+            learned: Shape (n_learned, 2).
+        """
+        images = learned[: self.n_states - self.n_learned]
+        return np.concatenate([learned, images[::-1, ::-1]])
 
     def _check(self) -> None:
         if not len(self.bins) == len(self.low) == len(self.high):
@@ -103,6 +139,11 @@ class Discretizer:
                 )
             if not 0 < (high - low) / n < math.inf:
                 raise ConfigError(f"the range {low!r} to {high!r} cannot be cut into {n} bins")
+            if self.mirror and n > 1 and low != -high:
+                raise ConfigError(
+                    "mirror needs ranges that are as long to the left as to the right; "
+                    f"{low!r} to {high!r} is not"
+                )
         if self.n_states > MAX_STATES:
             raise ConfigError(
                 f"bins {self.bins} make {self.n_states} states; the most is {MAX_STATES}"

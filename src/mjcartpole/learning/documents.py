@@ -7,12 +7,13 @@ from mjcartpole.envs.backend import Backend
 from mjcartpole.learning.config import DEFAULT_METHOD, TrainConfig, config_class
 from mjcartpole.learning.episodes import ENDINGS
 from mjcartpole.learning.stored import Fields, checked, read_document
+from mjcartpole.task import CARTPOLE_V1
 
 CONFIG, SUMMARY = "config.json", "summary.json"
 
 _ABOUT: Final[Fields] = {"preset": str, "video": bool}
-_ADDED: Final = ("task", "method")
-"""Fields that configs of version 0.1 lack: they had the default alone."""
+_ADDED: Final = {"task": CARTPOLE_V1.name, "method": DEFAULT_METHOD, "mirror": False}
+"""Fields that configs of version 0.1 lack, and what they stood for."""
 _SUMMARY_FIELDS: Final[Fields] = {
     "preset": str,
     "backend": Backend,
@@ -58,9 +59,9 @@ def read_values(values: dict[str, Any]) -> TrainConfig:
     Raises:
         ValueError: They are none.
     """
-    fields = config_class(str(values.get("method", DEFAULT_METHOD))).fields()
-    known = {f"{name}?" if name in _ADDED else name: fields[name] for name in fields}
-    return TrainConfig(**checked(values, known))
+    values = _ADDED | values
+    fields = config_class(str(values["method"])).fields()
+    return TrainConfig(**checked(values, fields))
 
 
 def read_summary(folder: Path) -> dict[str, Any]:

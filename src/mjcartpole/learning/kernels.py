@@ -62,7 +62,7 @@ class Scratch(NamedTuple):
 
 
 _ending_index = compiled(episodes.ending_index)
-_row_of = compiled(discretizer.row_of)
+_row_of, _folded = compiled(discretizer.row_of), compiled(discretizer.folded)
 
 
 @compiled
@@ -83,12 +83,12 @@ def _learn_episode(
     """Play an episode and learn; returns its return, steps and ending."""
     states, actions, rewards = scratch.states, scratch.actions, scratch.rewards
     state = begin(physics, rules, rngs[0])
-    s = _row_of(observe(physics, state), grid)
+    s, mirrored = _folded(_row_of(observe(physics, state), grid), grid.folding)
     states[0] = s
     total, steps, over, terminated = 0.0, 0, False, False
     while not over:
         a = act(p, memory, rates, s, rngs[1])
-        state = advance(physics, state, a)
+        state = advance(physics, state, 1 - a if mirrored else a)
         terminated = is_over(rules, state)
         if terminated and has_diverged(state):
             note(physics, state, steps, scratch.failure)
@@ -98,7 +98,7 @@ def _learn_episode(
         actions[steps], rewards[steps] = a, r
         steps += 1
         over = terminated or steps == rules.time_limit
-        s_next = _row_of(observe(physics, state), grid)
+        s_next, mirrored = _folded(_row_of(observe(physics, state), grid), grid.folding)
         after_step(p, memory, rates, Transition(s, a, r, s_next, terminated, over), rngs[1])
         states[steps] = s_next
         s = s_next

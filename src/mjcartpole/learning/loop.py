@@ -52,15 +52,15 @@ def _learn_episode(
     method, p, rng, memory = learner.method, learner.p, learner.rng, learner.quick_memory()
     act, after_step, step = method.act, method.after_step, env.step
     rates = method.begin_episode(p, memory, number, learner.episodes)
-    s = discretizer(observation.tolist())
+    s, mirrored = discretizer.folded(observation.tolist())
     states, actions, rewards = [s], list[int](), list[float]()
     over = terminated = False
     try:
         while not over:
             a = act(p, memory, rates, s, rng)
-            observation, reward, terminated, truncated, _ = step(a)
+            observation, reward, terminated, truncated, _ = step(1 - a if mirrored else a)
             r, over = float(reward), terminated or truncated
-            s_next = discretizer(observation.tolist())
+            s_next, mirrored = discretizer.folded(observation.tolist())
             after_step(p, memory, rates, Transition(s, a, r, s_next, terminated, over), rng)
             states.append(s_next)
             actions.append(a)

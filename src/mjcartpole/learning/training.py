@@ -1,5 +1,6 @@
 """From a `TrainConfig` to a `TrainResult`."""
 
+import dataclasses
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -19,6 +20,7 @@ from mjcartpole.learning.learner import Learner
 from mjcartpole.learning.loop import learn_episodes
 from mjcartpole.learning.policy import Policy
 from mjcartpole.physics.cartpole import CartPole
+from mjcartpole.physics.symmetry import check_symmetric
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -105,8 +107,8 @@ class Training:
             cartpole: The config's model, if it is loaded already.
 
         Raises:
-            ConfigError: There is no such engine, or the config's grid is for another number of
-                poles.
+            ConfigError: There is no such engine, the config's grid is for another number of
+                poles, or what is to be mirrored is not symmetric.
             ModelError: The model cannot be used.
         """
         check_engine(engine)
@@ -116,7 +118,9 @@ class Training:
         elif cartpole is None and env is None:
             cartpole = config.load_model()
         self.discretizer = config.discretizer(_count_poles(cartpole, env))
-        self.learner = Learner(config, self.discretizer.n_states)
+        if config.mirror:
+            check_symmetric(cartpole, config.integrator, task=config.rules)
+        self.learner = Learner(config, self.discretizer.n_learned)
         self.log = EpisodeLog(config.episodes)
         self._env_rng, _ = seeding.np_random(config.seed)
         self._seconds = 0.0
@@ -163,11 +167,11 @@ class Training:
 
     def result(self) -> TrainResult:
         """What has been learned so far; later episodes do not change it."""
-        values = self.learner.greedy_values
-        table = values.reshape(*self.discretizer.bins, task.N_ACTIONS).copy()
+        grid = dataclasses.replace(self.discretizer, mirror=False)
+        values = self.discretizer.unfolded(self.learner.greedy_values)
         return TrainResult(
             config=self.config,
-            policy=Policy(self.discretizer, table),
+            policy=Policy(grid, values.reshape(*grid.bins, task.N_ACTIONS)),
             episodes=self.log.copy(),
             seconds=self._seconds,
         )
