@@ -52,6 +52,18 @@ def test_numbers_are_gymnasiums():
     assert spec.reward_threshold == CARTPOLE_V1.reward_threshold
 
 
+@pytest.mark.parametrize(
+    ("task", "most"),
+    [
+        (CARTPOLE_V1, 500),
+        (CARTPOLE_V1.with_sutton_barto_reward(), 0),
+        (Task("own", reward=lambda *state: state[0]), UP),
+    ],
+)
+def test_the_most_that_an_episode_returns(task, most):
+    assert task.most_return == most
+
+
 @pytest.mark.parametrize(("terminated", "sutton_barto"), [(False, 0.0), (True, -1.0)])
 def test_reward(terminated, sutton_barto):
     state = (0.1, 0.2, 0.3, 0.4)

@@ -99,6 +99,11 @@ class Task:
         """
         return abs(x) > self.x_limit or abs(theta) > self.theta_limit
 
+    @property
+    def most_return(self) -> float:
+        """What no episode's return exceeds; infinite where the reward is one's own function."""
+        return CONSTANT.get(self.reward, math.inf) * self.time_limit
+
     def observation_bound(self, poles: int = 1) -> npt.NDArray[np.float32]:
         """Return the upper bound of the observation, shape (2 + 2 poles,); the lower is minus that.
 

@@ -96,6 +96,34 @@ def test_a_training_goes_on_from_its_checkpoint(config, tmp_path):
     assert list(resumed.log) == list(whole.log)
 
 
+EVALUATED = TrainConfig(backend="gym", episodes=12, evaluate_every=3)
+
+
+def test_evaluations_come_back_to_the_digit(tmp_path):
+    saved = checkpoint_after(7, EVALUATED)
+    save_checkpoint(tmp_path, saved)
+    loaded = load_checkpoint(tmp_path / LATEST, EVALUATED, DOCUMENT).snapshot.evaluations
+    assert loaded == saved.snapshot.evaluations
+    assert [(point.episodes, type(point.steps)) for point in loaded] == [(3, int), (6, int)]
+
+
+@pytest.mark.parametrize(
+    "numbers",
+    [
+        None,
+        np.zeros(10),
+        np.arange(9.0),
+        np.array([3, 9, 0, np.nan, 9, 6, 9, 0, 9, 9]),
+        np.zeros(99),
+    ],
+)
+def test_evaluations_that_the_training_does_not_have_are_refused(numbers, tmp_path):
+    save_checkpoint(tmp_path, checkpoint_after(7, EVALUATED))
+    path = tmp_path / LATEST
+    path.write_bytes(forged(path.read_bytes(), evaluations=numbers))
+    assert_refused(path, EVALUATED)
+
+
 def test_one_is_kept(tmp_path):
     for episodes in (3, 4, 5):
         save_checkpoint(tmp_path, checkpoint_after(episodes))
@@ -110,11 +138,12 @@ def test_a_folder_in_the_way_is_left_alone(tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == [LATEST]
 
 
-def test_a_checkpoint_of_a_config_without_task_and_method_is_read(content, scratch):
+def test_a_checkpoint_of_a_config_without_what_came_later_is_read(content, scratch):
     """Version 0.1 wrote such, with a table of two columns."""
     archive = dict(np.load(io.BytesIO(content[len(HEAD) + 65 :])))
     about = json.loads(archive["about"].tobytes())
-    del about["config"]["task"], about["config"]["method"]
+    for name in ("task", "method", "mirror", "evaluate_every", "until"):
+        del about["config"][name]
     archive["about"] = np.frombuffer(json.dumps(about).encode(), np.uint8)
     archive["q_table"] = archive["q_table"].reshape(-1, 2)
     packed = io.BytesIO()

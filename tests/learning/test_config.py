@@ -57,6 +57,15 @@ def test_presets_name_fields_only(name):
         ({"episodes": 2.5}, "whole number"),
         ({"episodes": True}, "whole number"),
         ({"log_every": 0}, "log_every"),
+        ({"evaluate_every": 0}, "evaluate_every must be a whole number from 1 up, not 0"),
+        ({"evaluate_every": 2.0}, "evaluate_every must be a whole number"),
+        (
+            {"until": 500.5},
+            "at most 500, the most that an episode of CartPole-v1 returns, not 500.5",
+        ),
+        ({"until": math.nan}, "until must be a number .* not nan"),
+        ({"until": -math.inf}, "until must be a number .* not -inf"),
+        ({"until": "475"}, "until must be a number"),
         ({"seed": -1}, "seed must be a whole number from 0 up"),
         ({"bins": (3, 3)}, "4 values"),
         ({"bins": (1, 3, 6, 0)}, "from 1 up"),
@@ -81,6 +90,21 @@ def test_presets_name_fields_only(name):
 def test_values_that_make_no_sense(changes, message):
     with pytest.raises(ConfigError, match=message):
         TrainConfig(**changes)
+
+
+@pytest.mark.parametrize(
+    ("changes", "period", "solved_at"),
+    [
+        ({}, None, 475),
+        ({"until": 300}, 15, 300),
+        ({"until": 300, "episodes": 60}, 1, 300),
+        ({"until": 500, "evaluate_every": 7}, 7, 500),
+        ({"evaluate_every": 2_000}, 2_000, 475),
+    ],
+)
+def test_when_a_training_is_evaluated_and_what_counts_as_solved(changes, period, solved_at):
+    config = TrainConfig(**changes)
+    assert (config.evaluation_period, config.solved_at) == (period, solved_at)
 
 
 def test_unknown_names_are_answered_with_those_that_are_there():

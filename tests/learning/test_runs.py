@@ -356,6 +356,11 @@ def test_a_complete_run_is_read_before_it_is_said_to_be_so(run, result):
         summary.write_text(json.dumps({**SUMMARY, **change}))
         with pytest.raises(RunError, match=why):
             runs.check_complete(run)
+    fewer = {**SUMMARY, "episodes": SUMMARY["episodes"] - 1}
+    for change in ({}, {"stopped": "since somebody says so"}):
+        summary.write_text(json.dumps(fewer | change))
+        with pytest.raises(RunError, match="episodes of another training"):
+            runs.check_complete(run)
     summary.write_text(json.dumps(SUMMARY))
     (run / documents.CONFIG).write_text("{}")
     with pytest.raises(RunError, match="is not the config of a run"):

@@ -41,6 +41,14 @@ def test_each_episode_is_a_point(tmp_path):
         assert values == sorted(values, reverse=True)
 
 
+def test_greedy_evaluations_are_curves_of_their_own(tmp_path):
+    result = train(TrainConfig(episodes=30, backend="gym", evaluate_every=10))
+    tensorboard.write_events(tmp_path, result)
+    curve = read_curves(tmp_path)["train/greedy_mean"]
+    assert [step for step, _ in curve] == [10, 20, 30]
+    assert [value for _, value in curve] == pytest.approx([its.mean for its in result.evaluations])
+
+
 def test_a_run_that_goes_on_has_neither_gap_nor_repeat(tmp_path):
     training = Training(TrainConfig(episodes=20, backend="gym"), engine="python")
     run = training.run()

@@ -73,6 +73,38 @@ def test_a_training_that_was_stopped_ends_like_one_that_was_not(stops, tmp_path)
     assert contents(tmp_path / "stopped") == contents(tmp_path / "whole")
 
 
+@pytest.mark.parametrize("stop", few([3, 10, 14], 10))
+def test_evaluations_of_a_stopped_training_are_those_of_one_that_was_not(stop, tmp_path):
+    config = TrainConfig(episodes=20, seed=6, backend="gym", evaluate_every=10)
+    conduct(tmp_path / "whole", engine="compiled", config=config)
+    conduct(tmp_path / "stopped", stop_after=stop, config=config)
+    said = (tmp_path / "stopped" / runs.EVALUATIONS).read_text()
+    assert said.count("\n") == 1 + stop // 10
+    conduct(tmp_path / "stopped", resume=True, config=config)
+    whole = (tmp_path / "whole" / runs.EVALUATIONS).read_text()
+    assert (tmp_path / "stopped" / runs.EVALUATIONS).read_text() == whole
+    assert whole.startswith(said)
+    assert contents(tmp_path / "stopped") == contents(tmp_path / "whole")
+
+
+def test_a_training_that_was_solved_is_over_and_says_so(tmp_path):
+    config = TrainConfig(episodes=200, seed=6, backend="gym", until=60, evaluate_every=3)
+    result, summary, evaluation = conduct(tmp_path, engine="compiled", config=config)
+    point = result.solved
+    assert len(result.returns) == point.episodes < 200
+    assert evaluation is not None
+    assert summary["interrupted"] is False
+    assert summary["solved"] == {
+        "at": 60,
+        "episodes": point.episodes,
+        "steps": result.steps,
+        "mean": point.mean,
+    }
+    assert summary["stopped"] == f"the mean greedy return, {point.mean:.2f}, reached 60"
+    timing = json.loads((tmp_path / runs.TIMING).read_text())
+    assert timing["seconds_to_solve"] == pytest.approx(point.seconds, abs=1e-3)
+
+
 @pytest.mark.slow
 def test_results_that_a_kill_left_half_written_are_written_again(tmp_path):
     conduct(tmp_path)

@@ -40,16 +40,18 @@ def train_session(session: Session, signals: StopSignals) -> None:
         _Doing(),
         BarColumn(),
         MofNCompleteColumn(),
-        TextColumn("episodes, mean return {task.fields[mean]:5.1f}"),
+        TextColumn("episodes, mean return {task.fields[mean]:5.1f}{task.fields[greedy]}"),
         TimeRemainingColumn(),
     )
     training = session.training
     with progress_bar(*columns) as progress:
         done = len(training.log)
-        bar = progress.add_task("", total=training.config.episodes, completed=done, mean=0.0)
+        total = training.config.episodes
+        bar = progress.add_task("", total=total, completed=done, mean=0.0, greedy="")
         for finished in session.run(signals.stop):
             recent = training.log.storage.totals[max(0, finished - RUNNING_MEAN) : finished]
-            progress.update(bar, completed=finished, mean=recent.mean())
+            greedy = "".join(f", greedy {its.mean:.1f}" for its in training.evaluations[-1:])
+            progress.update(bar, completed=finished, mean=recent.mean(), greedy=greedy)
     if progress.console.is_terminal:
         # No two runs take the same time: what stdout says is the same each time.
         result = training.result()

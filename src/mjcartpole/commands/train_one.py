@@ -86,6 +86,8 @@ def _finish(session: Session, begun: Begun, how: TrainOptions, signals: StopSign
                 session, folder, begun.cartpole, preset=begun.preset, events=events
             )
         _print_learning(result)
+        if "stopped" in summary:
+            print(f"\nstopped after episode {summary['episodes']:,}: {summary['stopped']}")
         if signals.stop() or greedy is None:
             raise Interrupted(number=signals.number)
         print_evaluation(greedy)
@@ -110,9 +112,12 @@ def _kept(folder: Path) -> str:
 
 
 def _print_learning(result: TrainResult) -> None:
-    """Print the article's table: mean return of each `log_every` episodes."""
+    """Print the article's table, mean return of each `log_every` episodes, and greedy means."""
     returns, every = result.returns, result.config.log_every
-    print("\n episode   mean return")
-    for start in range(0, len(returns), every):
+    # The last evaluation of each block stands beside it.
+    greedy = {(point.episodes - 1) // every: point.mean for point in result.evaluations}
+    print(f"\n episode   mean return{'   greedy mean' if greedy else ''}")
+    for number, start in enumerate(range(0, len(returns), every)):
         block = returns[start : start + every]
-        print(f"{start + len(block):8,} {block.mean():13.1f}")
+        beside = f" {greedy[number]:13.1f}" if number in greedy else ""
+        print(f"{start + len(block):8,} {block.mean():13.1f}{beside}")

@@ -13,7 +13,7 @@ from mjcartpole.signals import Interrupted, StopSignals
 from mjcartpole.studies import multi_seed_runs
 from mjcartpole.studies.multi_seed import SeedRunner
 from mjcartpole.studies.multi_seed_runs import ManyBegun
-from mjcartpole.studies.seeds import check_seeds
+from mjcartpole.studies.seeds import ManyResult, check_seeds
 
 
 def train(config: TrainConfig, how: TrainOptions, where: RunLocation, seeds: int) -> int:
@@ -77,6 +77,7 @@ def _finish(runner: SeedRunner, folder: Path, signals: StopSignals) -> int:
     many = runner.result()
     multi_seed_runs.write_seeds(folder, many)
     print_seeds(many)
+    _print_solving(many)
     print(f"\nruns   {folder}", flush=True)
     if signals.stop():
         raise Interrupted(
@@ -87,3 +88,14 @@ def _finish(runner: SeedRunner, folder: Path, signals: StopSignals) -> int:
     for found in many.failed:
         print(f"mjcartpole: error: seed {found.seed} failed: {found.error}", file=sys.stderr)
     return FAILED if many.failed else 0
+
+
+def _print_solving(many: ManyResult) -> None:
+    """Print how soon the seeds were solved, where their trainings were evaluated."""
+    if (its := many.solving()) is None:
+        return
+    median, p95 = ("never" if n is None else f"{n:,}" for n in (its.median, its.p95))
+    print(
+        f"episodes until the mean greedy return was at least {its.at:g}: median {median}, "
+        f"95 % of seeds {p95} ({its.solved} of {its.seeds} reached it)"
+    )

@@ -28,6 +28,7 @@ from mjcartpole.files import atomic_write, brief, opened
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.documents import read_values
 from mjcartpole.learning.episodes import ENDINGS, Columns
+from mjcartpole.learning.greedy_curve import GreedyPoint
 from mjcartpole.learning.learner import Learner
 from mjcartpole.learning.stored import Fields, checked, parse
 from mjcartpole.learning.training import Snapshot
@@ -57,6 +58,8 @@ _INSTEAD: Final = "restore it from a copy, or start again with --overwrite"
 _FRAME: Final = 2**20
 """Bytes of a checkpoint beside its table and its columns, and more than enough."""
 _EPISODE_BYTES: Final = 13
+_POINT: Final = len(GreedyPoint._fields)
+"""Numbers of one evaluation, 8 bytes each."""
 
 _GENERATOR: Final[Fields] = {
     "bit_generator": Literal["PCG64"],
@@ -124,6 +127,7 @@ def load_checkpoint(
     """
     memory = Learner(config, config.discretizer(poles).n_learned).memory
     most = sum(array.nbytes for array in memory) + config.episodes * _EPISODE_BYTES + _FRAME
+    most += 8 * _most_numbers(config)
     with opened(path, most, refusal=CheckpointError) as file:
         if not (line := file.readline(_LINE_LENGTH)).startswith(_HEAD):
             raise CheckpointError(
@@ -178,6 +182,8 @@ def _pack(checkpoint: Checkpoint) -> bytes:
         **snapshot.memory,
         **snapshot.columns._asdict(),
     }
+    if snapshot.evaluations:
+        arrays["evaluations"] = np.array(snapshot.evaluations, np.float64).ravel()
     np.savez(archive, **arrays)
     content = archive.getvalue()
     return _line(hashlib.sha256(content).hexdigest()) + content
@@ -195,10 +201,26 @@ def _snapshot(
         name: _array(archive, name, array.dtype, array.size).reshape(array.shape)
         for name, array in memory._asdict().items()
     }
-    seconds = float(about["seconds"])
-    snapshot = Snapshot(found, about["env_rng"], about["learner_rng"], columns, seconds)
-    _check_snapshot(snapshot)
+    seconds, curve = float(about["seconds"]), _evaluations(archive, config)
+    snapshot = Snapshot(found, about["env_rng"], about["learner_rng"], columns, seconds, curve)
+    _check_snapshot(snapshot, config.evaluation_period)
     return snapshot
+
+
+def _most_numbers(config: TrainConfig) -> int:
+    """Return how many numbers the evaluations of a whole training are."""
+    period = config.evaluation_period
+    return 0 if period is None else config.episodes // period * _POINT
+
+
+def _evaluations(archive: zipfile.ZipFile, config: TrainConfig) -> tuple[GreedyPoint, ...]:
+    if "evaluations.npy" not in archive.namelist():
+        return ()
+    numbers = _array(archive, "evaluations", np.float64, _most_numbers(config))
+    return tuple(
+        GreedyPoint(int(episodes), int(steps), *others)
+        for episodes, steps, *others in numbers.reshape(-1, _POINT).tolist()
+    )
 
 
 def _array(archive: zipfile.ZipFile, name: str, kind: npt.DTypeLike, most: int) -> npt.NDArray[Any]:
@@ -223,7 +245,7 @@ def _array(archive: zipfile.ZipFile, name: str, kind: npt.DTypeLike, most: int) 
     return np.frombuffer(content, kind)
 
 
-def _check_snapshot(snapshot: Snapshot) -> None:
+def _check_snapshot(snapshot: Snapshot, period: int | None) -> None:
     """Refuse numbers that no training can have come to.
 
     Raises:
@@ -238,6 +260,11 @@ def _check_snapshot(snapshot: Snapshot) -> None:
         raise ValueError("episodes without steps, or without a return")
     if not np.isin(endings, range(len(ENDINGS))).all() or snapshot.seconds < 0:
         raise ValueError("episodes that the training does not have")
+    due = range(period, len(totals) + 1, period) if period else ()
+    if [point.episodes for point in snapshot.evaluations] != list(due):
+        raise ValueError("evaluations at other episodes than the training has them")
+    if not np.isfinite(snapshot.evaluations).all():
+        raise ValueError("evaluations with values that are not finite")
     states: tuple[Any, Any] = (snapshot.env_rng, snapshot.learner_rng)
     for state in states:
         np.random.PCG64().state = state

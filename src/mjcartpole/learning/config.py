@@ -6,6 +6,7 @@ from the parameters of the learning method (see `methods/`).
 
 import dataclasses
 import functools
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, Self
@@ -13,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Final, Self
 from mjcartpole.envs.backend import Backend, check_backend
 from mjcartpole.errors import ConfigError, check_known
 from mjcartpole.integrator import Integrator
-from mjcartpole.learning.discretizer import Discretizer
+from mjcartpole.learning.discretizer import Discretizer, is_finite
 from mjcartpole.learning.methods import method_named
 from mjcartpole.learning.methods.parameters import Parameters
 from mjcartpole.task import (
@@ -127,6 +128,11 @@ class TrainConfig:
     """Learn of each state and action what their mirror images teach: left and right are alike."""
     log_every: int = 150
     """Episodes per row of the printed table."""
+    evaluate_every: int | None = None
+    """Play greedy episodes after each so many of training, for evaluations.csv and the printed
+    table; what is learned stays the same. With --until alone: a hundredth of all episodes."""
+    until: float | None = None
+    """Stop once the mean return of such greedy episodes reaches this, 475 for example."""
 
     if TYPE_CHECKING:
 
@@ -161,6 +167,7 @@ class TrainConfig:
         object.__setattr__(self, "task", resolve(self.task).name)
         _ = self.rules
         self._check_counts()
+        self._check_until()
         self._check_dimensions()
         assert isinstance(self, Parameters)
         self.check_parameters()
@@ -243,6 +250,18 @@ class TrainConfig:
         return Discretizer(bins, low, high, self.mirror)
 
     @property
+    def evaluation_period(self) -> int | None:
+        """Training episodes between two greedy evaluations; None where there are none."""
+        if self.evaluate_every is None and self.until is not None:
+            return max(1, self.episodes // 100)
+        return self.evaluate_every
+
+    @property
+    def solved_at(self) -> float | None:
+        """The mean greedy return that counts as solved: `until`, or else what the task says."""
+        return self.rules.reward_threshold if self.until is None else self.until
+
+    @property
     def _most_poles(self) -> int:
         return max(len(getattr(self, name)) for name in _GRID) // 2 - 1
 
@@ -256,13 +275,25 @@ class TrainConfig:
                 )
 
     def _check_counts(self) -> None:
-        for name, least in (("episodes", 1), ("log_every", 1), ("seed", 0)):
+        counts = {"episodes": 1, "log_every": 1, "seed": 0, "evaluate_every": 1}
+        for name, least in counts.items():
             value = getattr(self, name)
+            if value is None and name == "evaluate_every":
+                continue
             if type(value) is not int or value < least:
                 raise ConfigError(f"{name} must be a whole number from {least} up, not {value!r}")
         for name, most in _MOST.items():
             if getattr(self, name) > most:
                 raise ConfigError(f"{name} must be at most {most:,}; this one is larger")
+
+    def _check_until(self) -> None:
+        until, most = self.until, self.rules.most_return
+        if until is None or (is_finite(until) and until <= most):
+            return
+        at_most = f" of at most {most:g}, the most that an episode of {self.task} returns"
+        raise ConfigError(
+            f"until must be a number{at_most if math.isfinite(most) else ''}, not {until!r}"
+        )
 
 
 @functools.cache

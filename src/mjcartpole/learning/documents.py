@@ -12,7 +12,13 @@ from mjcartpole.task import CARTPOLE_V1
 CONFIG, SUMMARY = "config.json", "summary.json"
 
 _ABOUT: Final[Fields] = {"preset": str, "video": bool}
-_ADDED: Final = {"task": CARTPOLE_V1.name, "method": DEFAULT_METHOD, "mirror": False}
+_ADDED: Final = {
+    "task": CARTPOLE_V1.name,
+    "method": DEFAULT_METHOD,
+    "mirror": False,
+    "evaluate_every": None,
+    "until": None,
+}
 """Fields that configs of version 0.1 lack, and what they stood for."""
 _SUMMARY_FIELDS: Final[Fields] = {
     "preset": str,
@@ -23,6 +29,8 @@ _SUMMARY_FIELDS: Final[Fields] = {
     "interrupted": bool,
     "steps": int,
     "mean_return_last_100": float | None,
+    "solved?": {"at": float, "episodes": int, "steps": int, "mean": float},
+    "stopped?": str,
     "evaluation?": {
         "backend": Backend,
         "seed": int,
@@ -81,7 +89,9 @@ def read_figures(folder: Path, config: TrainConfig) -> dict[str, Any]:
     """
 
     def made(summary: dict[str, Any]) -> dict[str, Any]:
-        names = ("backend", "model", "seed", "episodes")
+        names = ["backend", "model", "seed"]
+        # One that was told to stop at a greedy return may have fewer episodes.
+        names += [] if config.until is not None and "stopped" in summary else ["episodes"]
         if other := [name for name in names if summary[name] != getattr(config, name)]:
             raise ValueError(f"{', '.join(other)} of another training than the config's")
         if summary["interrupted"] or "evaluation" not in summary:

@@ -12,6 +12,7 @@ from gymnasium.utils import seeding
 from mjcartpole.envs.backend import GYM_ID, Backend, check_backend, make_env
 from mjcartpole.errors import ConfigError
 from mjcartpole.integrator import Integrator
+from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.engine import Engine, choose_engine
 from mjcartpole.learning.episodes import ENDINGS, Episode
 from mjcartpole.learning.loop import play_episode
@@ -19,6 +20,7 @@ from mjcartpole.learning.policy import Policy
 from mjcartpole.task import CARTPOLE_V1, Task, resolve
 
 if TYPE_CHECKING:
+    from mjcartpole.physics.cartpole import CartPole
     from mjcartpole.physics.load import ModelLike
 
 EPISODES: Final = 100
@@ -136,6 +138,29 @@ def evaluate(
     )
     env.close()
     return Evaluation(backend, seed, played)
+
+
+def evaluate_where_trained(
+    policy: Policy,
+    config: TrainConfig,
+    cartpole: "CartPole | None",
+    engine: Engine,
+    seed: int = SEED,
+) -> Evaluation:
+    """Play a greedy policy as it was trained: backend, model (for mujoco), integrator, task.
+
+    Raises:
+        SimulationError: The physics diverged.
+    """
+    return evaluate(
+        policy,
+        backend=config.backend,
+        model=cartpole if cartpole is not None and config.backend == "mujoco" else "cartpole",
+        integrator=config.integrator,
+        task=config.rules,
+        seed=seed,
+        engine=engine,
+    )
 
 
 def check_count(episodes: int, seed: int) -> None:

@@ -7,6 +7,7 @@ versions.json   Python, the platform and the packages
 config.json     the preset's name and the full config; with it a training can be continued
 checkpoint.bin  while it lasts: its state (see checkpoints.py)
 episodes.csv    one line per training episode
+evaluations.csv where they were asked for: one line per greedy evaluation in between
 policy.json     the greedy policy (see policy.py)
 timing.json     how long it took: the one file that differs between equal runs
 summary.json    what came out
@@ -49,6 +50,7 @@ BEGINNING: Final = (VERSIONS, MODEL, CONFIG)
 """In the order of writing: what a kill leaves of them is known by the versions."""
 RESULTS: Final = (EPISODES, POLICY, TIMING, SUMMARY)
 FILES: Final = (*BEGINNING, *RESULTS)
+EVALUATIONS: Final = "evaluations.csv"
 EVENTS: Final = "events.out.tfevents.*"
 """TensorBoard's (see tensorboard.py)."""
 
@@ -167,8 +169,10 @@ def write_results(folder: Path, result: TrainResult, summary: dict[str, Any]) ->
     """
     write_whole(folder / EPISODES, result.episodes.csv())
     result.policy.save(folder / POLICY)
-    seconds = round(result.seconds, 3)
-    write_whole(folder / TIMING, _json({"training_seconds": seconds, "steps": result.steps}))
+    timing = {"training_seconds": round(result.seconds, 3), "steps": result.steps}
+    if result.solved is not None:
+        timing["seconds_to_solve"] = round(result.solved.seconds, 3)
+    write_whole(folder / TIMING, _json(timing))
     write_summary(folder, summary)
 
 
@@ -350,7 +354,7 @@ def _own(content: set[str]) -> list[str]:
     """Names of a run's files, those of `content` among them, in the order of their removal."""
     # The config first: without it a folder holds no run, so that two are never mixed.
     events = fnmatch.filter(content, EVENTS)
-    return [CONFIG, MODEL, *events, *RESULTS, LATEST, FORMER, VERSIONS]
+    return [CONFIG, MODEL, *events, EVALUATIONS, *RESULTS, LATEST, FORMER, VERSIONS]
 
 
 def _remove_files(folder: Path, keep: Iterable[str] = ()) -> None:

@@ -6,7 +6,10 @@ from pathlib import Path
 from typing import Final
 
 from mjcartpole.errors import ConfigError
+from mjcartpole.files import write_whole
 from mjcartpole.learning.checkpoints import Checkpoint, checksum, save_checkpoint
+from mjcartpole.learning.greedy_curve import as_csv
+from mjcartpole.learning.runs import EVALUATIONS
 from mjcartpole.learning.training import Training
 from mjcartpole.physics.cartpole import CartPole
 
@@ -78,15 +81,18 @@ class Session:
             self.training.restore(checkpoint.snapshot)
 
     def save(self) -> None:
-        """Write a checkpoint now.
+        """Write a checkpoint now, and the greedy evaluations so far.
 
         Raises:
             FileError: See `run`.
         """
         snapshot = self.training.snapshot()
-        save_checkpoint(self._folder, Checkpoint(self.training.config, self._model, snapshot))
+        config = self.training.config
+        save_checkpoint(self._folder, Checkpoint(config, self._model, snapshot))
+        if config.evaluation_period is not None:
+            write_whole(self._folder / EVALUATIONS, as_csv(snapshot.evaluations))
 
     @property
     def is_over(self) -> bool:
-        """Whether all episodes are done."""
-        return len(self.training.log) == self.training.config.episodes
+        """Whether nothing is left to train."""
+        return self.training.is_over

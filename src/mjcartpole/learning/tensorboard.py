@@ -2,6 +2,7 @@
 
 import contextlib
 import importlib.util
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
@@ -30,7 +31,7 @@ def check_installed() -> None:
 
 
 def write_events(folder: Path, result: TrainResult) -> None:
-    """Write the return and the method's rates per episode, in place of events that are there.
+    """Write returns, the method's rates and greedy means in place of events that are there.
 
     Raises:
         ConfigError: tensorboardX is not installed.
@@ -41,20 +42,25 @@ def write_events(folder: Path, result: TrainResult) -> None:
     from tensorboardX.record_writer import RecordWriter  # noqa: PLC0415
     from tensorboardX.summary import scalar  # noqa: PLC0415
 
-    learner, returns = Learner(result.config, 1), result.returns
-    begin_episode = learner.method.begin_episode
     with (
         atomic_write(folder / NAME) as temporary,
         contextlib.closing(RecordWriter(str(temporary))) as writer,
     ):
         writer.write(Event(wall_time=0, file_version="brain.Event:2").SerializeToString())
-        for block in np.array_split(np.arange(len(returns)), min(POINTS, max(len(returns), 1))):
-            if not block.size:
-                continue
-            number = int(block[-1])
-            rates = begin_episode(learner.p, learner.memory, number, learner.episodes)
-            values = {"return": float(returns[block].mean())} | rates._asdict()
+        for step, values in _points(result):
             for name, value in values.items():
                 summary = scalar(f"train/{name}", value)
-                event = Event(wall_time=0, step=number + 1, summary=summary)
-                writer.write(event.SerializeToString())
+                writer.write(Event(wall_time=0, step=step, summary=summary).SerializeToString())
+
+
+def _points(result: TrainResult) -> Iterator[tuple[int, dict[str, float]]]:
+    """Yield numbers of episodes, with values by the names of their curves."""
+    learner, returns = Learner(result.config, 1), result.returns
+    begin_episode = learner.method.begin_episode
+    for block in np.array_split(np.arange(len(returns)), min(POINTS, max(len(returns), 1))):
+        if block.size:
+            number = int(block[-1])
+            rates = begin_episode(learner.p, learner.memory, number, learner.episodes)
+            yield number + 1, {"return": float(returns[block].mean())} | rates._asdict()
+    for point in result.evaluations:
+        yield point.episodes, {"greedy_mean": point.mean, "greedy_minimum": point.minimum}

@@ -13,9 +13,12 @@ from gymnasium.utils import seeding
 
 from mjcartpole import task
 from mjcartpole.envs.backend import make_env
+from mjcartpole.errors import ConfigError, SimulationError
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.engine import Engine, check_engine, choose_engine
 from mjcartpole.learning.episodes import Columns, EpisodeLog
+from mjcartpole.learning.evaluation import evaluate_where_trained
+from mjcartpole.learning.greedy_curve import CURVE_SEED, GreedyPoint, first_reached
 from mjcartpole.learning.learner import Learner
 from mjcartpole.learning.loop import learn_episodes
 from mjcartpole.learning.policy import Policy
@@ -31,13 +34,15 @@ class TrainResult:
         config: What was asked for.
         policy: The greedy policy of the final table.
         episodes: One record per episode that was finished.
-        seconds: Time it took, without that for compiling the loop.
+        seconds: Time it took, without that for compiling the loop and for greedy episodes.
+        evaluations: The greedy evaluations in its midst, where the config asks for them.
     """
 
     config: TrainConfig
     policy: Policy
     episodes: EpisodeLog
     seconds: float
+    evaluations: tuple[GreedyPoint, ...] = ()
 
     @property
     def q_table(self) -> npt.NDArray[np.float64]:
@@ -54,6 +59,11 @@ class TrainResult:
         """Environment steps of all episodes."""
         return int(self.episodes.columns.steps.sum())
 
+    @property
+    def solved(self) -> GreedyPoint | None:
+        """The first evaluation whose mean reached `until`, or else the task's reward threshold."""
+        return first_reached(self.evaluations, self.config.solved_at)
+
     def __repr__(self) -> str:
         return f"TrainResult({self.config!r}, {self.episodes!r}, {self.policy!r})"
 
@@ -68,6 +78,7 @@ class Snapshot:
         learner_rng: State of the learner's generator.
         columns: The episodes so far, see `EpisodeLog`.
         seconds: Time they took.
+        evaluations: The greedy evaluations so far.
     """
 
     memory: dict[str, npt.NDArray[Any]] = field(repr=False)
@@ -75,6 +86,7 @@ class Snapshot:
     learner_rng: dict[str, Any] = field(repr=False)
     columns: Columns = field(repr=False)
     seconds: float
+    evaluations: tuple[GreedyPoint, ...] = field(default=(), repr=False)
 
 
 class Training:
@@ -88,6 +100,7 @@ class Training:
         discretizer: From observations to the learner's states.
         learner: Learns.
         log: The episodes that are finished.
+        evaluations: The greedy evaluations so far.
     """
 
     def __init__(
@@ -108,10 +121,13 @@ class Training:
 
         Raises:
             ConfigError: There is no such engine, the config's grid is for another number of
-                poles, or what is to be mirrored is not symmetric.
+                poles, what is to be mirrored is not symmetric, or greedy episodes are asked for
+                in an environment of one's own.
             ModelError: The model cannot be used.
         """
         check_engine(engine)
+        if env is not None and config.evaluation_period is not None:
+            raise ConfigError("evaluate_every and until are for the config's own environment")
         self.config = config
         if config.backend == "gym":
             cartpole = None
@@ -122,6 +138,8 @@ class Training:
             check_symmetric(cartpole, config.integrator, task=config.rules)
         self.learner = Learner(config, self.discretizer.n_learned)
         self.log = EpisodeLog(config.episodes)
+        self.evaluations: tuple[GreedyPoint, ...] = ()
+        self._cartpole = cartpole
         self._env_rng, _ = seeding.np_random(config.seed)
         self._seconds = 0.0
         self.engine: Engine = "python"
@@ -138,7 +156,7 @@ class Training:
             self._env = make_env(*physics)
 
     def run(self) -> Iterator[int]:
-        """Train to the end; the clock starts when the loop is compiled.
+        """Train to the end; the clock runs neither while the loop is compiled nor in evaluations.
 
         Yields:
             The number of finished episodes, after each or after some thousands of steps.
@@ -146,14 +164,48 @@ class Training:
         Raises:
             SimulationError: The physics diverged; names episode and step.
         """
-        numbers = range(len(self.log), self.config.episodes)
         run = self._run_compiled if self.engine == "compiled" else self._run_python
         if self.engine == "compiled":
             self._loop.compile(self.learner, self.discretizer, self._env_rng, self.log)
-        before, started = self._seconds, time.perf_counter()
-        for finished in run(numbers):
-            self._seconds = before + time.perf_counter() - started
-            yield finished
+        self._evaluate_if_due()
+        started = time.perf_counter() - self._seconds
+        while not self.is_over:
+            for finished in run(range(len(self.log), self._next_evaluation())):
+                self._seconds = time.perf_counter() - started
+                if self._evaluate_if_due():
+                    started = time.perf_counter() - self._seconds
+                yield finished
+        if self.engine == "python":
+            self._env.close()
+
+    @property
+    def is_over(self) -> bool:
+        """Whether nothing is left to train: all episodes are done, or `until` is reached."""
+        until = self.config.until
+        return len(self.log) == self.config.episodes or (
+            until is not None and first_reached(self.evaluations, until) is not None
+        )
+
+    def _next_evaluation(self) -> int:
+        """Return after how many episodes the next evaluation is due, or the training over."""
+        period = self.config.evaluation_period or self.config.episodes
+        return min((len(self.log) // period + 1) * period, self.config.episodes)
+
+    def _evaluate_if_due(self) -> bool:
+        """Play greedy episodes where it is time; the training's own generators draw nothing."""
+        done, period = len(self.log), self.config.evaluation_period
+        if period is None or done % period or done == len(self.evaluations) * period:
+            return False
+        try:
+            played = evaluate_where_trained(
+                self._policy(), self.config, self._cartpole, self.engine, CURVE_SEED
+            )
+        except SimulationError as error:
+            raise SimulationError(f"evaluation after {done:,} episodes: {error}") from error
+        steps = int(self.log.columns.steps.sum())
+        point = GreedyPoint(done, steps, self._seconds, played.mean, played.minimum)
+        self.evaluations = (*self.evaluations, point)
+        return True
 
     def _run_compiled(self, numbers: range) -> Iterator[int]:
         return self._loop.learn(self.learner, self.discretizer, self._env_rng, self.log, numbers)
@@ -163,18 +215,21 @@ class Training:
         for episode in learn_episodes(self._env, self.learner, self.discretizer, numbers):
             self.log.append(episode)
             yield len(self.log)
-        self._env.close()
 
     def result(self) -> TrainResult:
         """What has been learned so far; later episodes do not change it."""
-        grid = dataclasses.replace(self.discretizer, mirror=False)
-        values = self.discretizer.unfolded(self.learner.greedy_values)
         return TrainResult(
             config=self.config,
-            policy=Policy(grid, values.reshape(*grid.bins, task.N_ACTIONS)),
+            policy=self._policy(),
             episodes=self.log.copy(),
             seconds=self._seconds,
+            evaluations=self.evaluations,
         )
+
+    def _policy(self) -> Policy:
+        grid = dataclasses.replace(self.discretizer, mirror=False)
+        values = self.discretizer.unfolded(self.learner.greedy_values)
+        return Policy(grid, values.reshape(*grid.bins, task.N_ACTIONS))
 
     def snapshot(self) -> Snapshot:
         """All that is needed to go on from here; later episodes do not change it."""
@@ -184,6 +239,7 @@ class Training:
             learner_rng=dict(self.learner.rng.bit_generator.state),
             columns=self.log.copy().columns,
             seconds=self._seconds,
+            evaluations=self.evaluations,
         )
 
     def restore(self, snapshot: Snapshot) -> None:
@@ -194,6 +250,7 @@ class Training:
         self.learner.rng.bit_generator.state = snapshot.learner_rng
         self.log = EpisodeLog.of(snapshot.columns, self.config.episodes)
         self._seconds = snapshot.seconds
+        self.evaluations = snapshot.evaluations
 
 
 def train(config: TrainConfig | None = None, *, engine: Engine = "compiled") -> TrainResult:

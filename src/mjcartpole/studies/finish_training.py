@@ -6,11 +6,8 @@ from typing import Any
 
 from mjcartpole.errors import RunError
 from mjcartpole.learning import runs, tensorboard
-from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.documents import read_summary
-from mjcartpole.learning.engine import Engine
-from mjcartpole.learning.evaluation import Evaluation, evaluate
-from mjcartpole.learning.policy import Policy
+from mjcartpole.learning.evaluation import Evaluation, evaluate_where_trained
 from mjcartpole.learning.session import Session
 from mjcartpole.learning.training import TrainResult
 from mjcartpole.physics.cartpole import CartPole
@@ -50,20 +47,6 @@ def finish_training(
     return result, summary, evaluation
 
 
-def evaluate_where_trained(
-    policy: Policy, config: TrainConfig, cartpole: CartPole, engine: Engine
-) -> Evaluation:
-    """Play a greedy policy as it was trained: backend, model, integrator, task."""
-    return evaluate(
-        policy,
-        backend=config.backend,
-        model=cartpole if config.backend == "mujoco" else "cartpole",
-        integrator=config.integrator,
-        task=config.rules,
-        engine=engine,
-    )
-
-
 def _film_of(folder: Path) -> dict[str, Any]:
     """The film that this training had begun when it was stopped: it keeps its name."""
     with contextlib.suppress(RunError):
@@ -73,14 +56,25 @@ def _film_of(folder: Path) -> dict[str, Any]:
 
 
 def _summary(result: TrainResult, *, preset: str, interrupted: bool) -> dict[str, Any]:
-    returns = result.returns
-    return {
+    returns, solved, config = result.returns, result.solved, result.config
+    summary = {
         "preset": preset,
-        "backend": result.config.backend,
-        "model": result.config.model,
-        "seed": result.config.seed,
+        "backend": config.backend,
+        "model": config.model,
+        "seed": config.seed,
         "episodes": len(returns),
         "interrupted": interrupted,
         "steps": result.steps,
         "mean_return_last_100": float(returns[-100:].mean()) if len(returns) else None,
     }
+    if solved is not None:
+        episodes, steps, _, mean, _ = solved
+        summary["solved"] = {
+            "at": config.solved_at,
+            "episodes": episodes,
+            "steps": steps,
+            "mean": mean,
+        }
+        if config.until is not None and not interrupted:
+            summary["stopped"] = f"the mean greedy return, {mean:.2f}, reached {config.until:g}"
+    return summary

@@ -19,15 +19,16 @@ from mjcartpole.errors import MjCartPoleError, RunError
 from mjcartpole.learning import runs
 from mjcartpole.learning.checkpoints import Checkpoint
 from mjcartpole.learning.config import TrainConfig
-from mjcartpole.learning.documents import CONFIG
+from mjcartpole.learning.documents import CONFIG, read_summary
 from mjcartpole.learning.engine import Engine, choose_engine
+from mjcartpole.learning.evaluation import evaluate_where_trained
 from mjcartpole.learning.run_model import check_storable
 from mjcartpole.learning.session import CHECKPOINT_EVERY, Session
 from mjcartpole.learning.training import Training
 from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.load import load_model, load_named
 from mjcartpole.studies import multi_seed_runs
-from mjcartpole.studies.finish_training import evaluate_where_trained, finish_training
+from mjcartpole.studies.finish_training import finish_training
 from mjcartpole.studies.seeds import ManyResult, SeedResult, check_seeds, seed_folder
 
 
@@ -290,7 +291,7 @@ def _train_in_memory(job: _Job, cartpole: CartPole, stop: Callable[[], bool]) ->
             return SeedResult(job.config.seed)
     result = training.result()
     evaluation = evaluate_where_trained(result.policy, job.config, cartpole, job.engine)
-    return SeedResult(job.config.seed, evaluation, result)
+    return SeedResult.of(result, evaluation)
 
 
 def _train_on_disk(
@@ -301,7 +302,8 @@ def _train_on_disk(
         run = runs.check_complete(folder, job.allow_assets)
         _check_same(job, folder, run.config)
         again = evaluate_where_trained(run.policy, job.config, cartpole, job.engine)
-        return SeedResult(seed, again)
+        solved = read_summary(folder).get("solved")
+        return SeedResult(seed, again, solved_after=solved["episodes"] if solved else None)
     training = Training(job.config, engine=job.engine, cartpole=cartpole)
     session = Session(folder, training, cartpole, every=job.every)
     with _begun(job, folder, cartpole) as checkpoint:
@@ -314,7 +316,7 @@ def _train_on_disk(
         if evaluation is None:
             return SeedResult(seed)
         runs.finish_run(folder)
-    return SeedResult(seed, evaluation, result)
+    return SeedResult.of(result, evaluation)
 
 
 @contextlib.contextmanager

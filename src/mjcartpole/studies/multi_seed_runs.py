@@ -134,6 +134,8 @@ def write_seeds(folder: Path, many: ManyResult) -> None:
         "failed": {str(found.seed): found.error for found in many.failed},
         "greedy_return": None if aggregate is None else aggregate.summary(),
     }
+    if solving := many.solving():
+        summary["episodes_to_solve"] = solving._asdict()
     write_whole(folder / AGGREGATE, json.dumps(summary, indent=2) + "\n")
 
 

@@ -1,11 +1,14 @@
 """Seeds: which of a config are meant, and what they have come to."""
 
 import dataclasses
+import math
 import reprlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Final, NamedTuple, Self
+
+import numpy as np
 
 from mjcartpole.errors import ConfigError
 from mjcartpole.learning.config import TrainConfig
@@ -25,12 +28,21 @@ class SeedResult:
         evaluation: The greedy evaluation; None if the seed failed or was stopped.
         result: What was learned; None if the seed failed, or was complete on disk before.
         error: Why it failed; empty if it did not.
+        solved_after: Training episodes until a greedy evaluation in its midst reached what counts
+            as solved; None if none did, or there were none.
     """
 
     seed: int
     evaluation: Evaluation | None = None
     result: TrainResult | None = None
     error: str = ""
+    solved_after: int | None = None
+
+    @classmethod
+    def of(cls, result: TrainResult, evaluation: Evaluation) -> Self:
+        """Return what a seed has come to that was trained to the end."""
+        after = None if result.solved is None else result.solved.episodes
+        return cls(result.config.seed, evaluation, result, solved_after=after)
 
     @property
     def score(self) -> float | None:
@@ -40,6 +52,21 @@ class SeedResult:
     def __repr__(self) -> str:
         outcome = self.error or self.evaluation or "not finished"
         return f"SeedResult({self.seed}: {outcome})"
+
+
+class Solving(NamedTuple):
+    """How many episodes it took seeds until a greedy evaluation reached what counts as solved."""
+
+    at: float
+    """That mean return."""
+    seeds: int
+    """How many were trained to the end."""
+    solved: int
+    """How many of these were solved."""
+    median: int | None
+    """Episodes within which half of them were; None where fewer were solved at all."""
+    p95: int | None
+    """Episodes within which 95 % of them were; None likewise."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -69,6 +96,18 @@ class ManyResult:
         if not self.scores:
             return None
         return aggregate(self.scores, solved_at=self.config.rules.reward_threshold)
+
+    def solving(self) -> Solving | None:
+        """Return how soon the seeds were solved; None where their trainings were not evaluated."""
+        found = [each.solved_after for each in self.seeds if each.evaluation is not None]
+        at = self.config.solved_at
+        if self.config.evaluation_period is None or at is None or not found:
+            return None
+        after = np.array([math.inf if each is None else each for each in found])
+        # Numbers that seeds have: between an episode and none at all there is no middle.
+        within = np.quantile(after, (0.5, 0.95), method="inverted_cdf")
+        median, p95 = (int(n) if math.isfinite(n) else None for n in within)
+        return Solving(at, len(found), int(np.isfinite(after).sum()), median, p95)
 
     def __repr__(self) -> str:
         count, scores = len(self.seeds), self.scores
