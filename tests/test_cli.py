@@ -25,7 +25,7 @@ def test_training_leaves_a_complete_run_and_its_evaluation_repeats(run, capsys):
     assert sum(int(count) for count in re.findall(r"^  .*?(\d+)$", out, re.M)[1:]) == 100
     code, out, _ = call(["evaluate", "runs/mine", "--json"], capsys)
     assert json.loads(out).items() >= summary["evaluation"].items()
-    policy = train(TrainConfig(episodes=30, seed=3)).policy
+    policy = train(TrainConfig(episodes=5, seed=8)).policy
     assert Policy.load(run / "policy.json").q_table.tobytes() == policy.q_table.tobytes()
 
 

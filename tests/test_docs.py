@@ -37,10 +37,8 @@ PATIENCE = 900
 FAST = {
     "README.md": {
         "make train",
-        "mjcartpole doctor",
         "mjcartpole model edit cartpole --set pole.mass=0.3 -o heavy.xml",
         "mjcartpole evaluate runs/tuned-mujoco-seed0 --model heavy.xml",
-        "mjcartpole model list",
         "import gymnasium",
     },
     "docs/performance.md": {"mjcartpole --help"},

@@ -4,7 +4,7 @@ import time
 
 import pytest
 
-from mjcartpole import cli
+from command_line import done
 from mjcartpole.learning.checkpoints import LATEST
 from trainings import SLOW, Forked, wait_until
 
@@ -29,9 +29,7 @@ def fork():
 def slow_reference(tmp_path_factory):
     """What `SLOW` comes to."""
     folder = tmp_path_factory.mktemp("reference") / "run"
-    with pytest.raises(SystemExit) as stop:
-        cli.main(["train", *SLOW[1:], "--engine", "compiled", "--run-dir", str(folder)])
-    assert stop.value.code == 0
+    done([*SLOW, "--engine", "compiled", "--run-dir", folder])
     return folder
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from command_line import call
+from command_line import call, done
 from mjcartpole.physics.load import load_model
 from nightly import few
 from trainings import EACH, assert_equal_runs, dies_at, names, needs_proc, wait_until
@@ -20,13 +20,20 @@ from trainings import EACH, assert_equal_runs, dies_at, names, needs_proc, wait_
 FEW = ["train", "--episodes", "12", "--seed", "3"]
 
 
-@pytest.fixture
-def alone(here, capsys):
+@pytest.fixture(scope="module")
+def three(tmp_path_factory):
     """Each of three seeds, trained alone."""
-    for seed in ("3", "4", "5"):
+    folder = tmp_path_factory.mktemp("three")
+    for seed in (3, 4, 5):
         arguments = ["train", "--episodes", "12", "--seed", seed, "--no-video"]
-        assert call([*arguments, "--run-dir", f"alone-{seed}"], capsys)[0] == 0
-    return here
+        done([*arguments, "--run-dir", folder / f"alone-{seed}"])
+    return folder
+
+
+@pytest.fixture
+def alone(here, three):
+    """The same, in a folder of its own."""
+    return shutil.copytree(three, here, dirs_exist_ok=True)
 
 
 def assert_equal_seeds(folder):

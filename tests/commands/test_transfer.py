@@ -17,11 +17,13 @@ from mjcartpole.learning.runs import begin_run, write_results
 from mjcartpole.learning.training import train
 from mjcartpole.physics.load import load_model
 from mjcartpole.task import TASKS, Task, register
+from nightly import at_night
 
 
 @pytest.fixture(scope="module")
 def trained():
-    return [train(TrainConfig.preset("tuned", episodes=150, seed=seed)) for seed in range(4)]
+    episodes = at_night(150, fast=30)
+    return [train(TrainConfig.preset("tuned", episodes=episodes, seed=seed)) for seed in range(4)]
 
 
 @pytest.fixture

@@ -4,7 +4,7 @@ import pytest
 
 from mjcartpole import cli
 
-QUICK = ["--episodes", "30", "--no-video"]
+QUICK = ["--episodes", "5", "--no-video"]
 """A training that takes no time."""
 
 
@@ -14,3 +14,10 @@ def call(arguments, capsys):
         cli.main([str(argument) for argument in arguments])
     captured = capsys.readouterr()
     return stop.value.code, captured.out, captured.err
+
+
+def done(arguments):
+    """Run a command that ends well; what it prints goes wherever prints go."""
+    with pytest.raises(SystemExit) as stop:
+        cli.main([str(argument) for argument in arguments])
+    assert stop.value.code == 0

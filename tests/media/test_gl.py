@@ -169,7 +169,7 @@ def test_renderers_nobody_closes_end_in_silence(wish):
     assert (done.returncode, done.stdout.strip(), done.stderr) == (0, wish, "")
 
 
-@pytest.fixture(params=["egl", "osmesa"])
+@pytest.fixture(params=few(["egl", "osmesa"], "egl"))
 def backend(request):
     if not gl.works(request.param):
         pytest.skip(f"no OpenGL by {request.param} here")
@@ -238,6 +238,7 @@ def test_other_processes_draw(backend, tmp_path, method, when, expected):
     assert expected is None or "was forked from one that had used OpenGL" in done.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork here")
 def test_a_fork_without_a_wish_is_told_too(tmp_path):
     if gl.find_backend() is None:

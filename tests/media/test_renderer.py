@@ -17,6 +17,7 @@ from mjcartpole.media.renderer import GLRenderer, open_renderer
 from mjcartpole.media.scene import Scene
 from mjcartpole.physics.load import load_model
 from mjcartpole.task import Task
+from nightly import at_night, few
 
 WIDTH, HEIGHT = 640, 480
 HALF_VIEW = 9 * math.tan(math.radians(26) / 2) * WIDTH / HEIGHT
@@ -111,7 +112,7 @@ def random_states(count, seed):
 
 def test_the_picture_is_true_for_states_nobody_chose_with_and_without_overlay(renderer):
     overlay = Overlay(renderer.scene)
-    for step, state in enumerate(random_states(25, seed=5)):
+    for step, state in enumerate(random_states(at_night(25, fast=6), seed=5)):
         frame = renderer.render(state)
         for _ in range(2):
             assert measured_angle(frame) == pytest.approx(state[2], abs=math.radians(1))
@@ -123,7 +124,7 @@ def test_the_picture_is_true_for_states_nobody_chose_with_and_without_overlay(re
 @pytest.mark.parametrize("quality", ["draft", "high"])
 def test_the_picture_is_true_at_every_quality(cartpole, kind, quality):
     with open_renderer(cartpole, kind=kind, quality=quality) as renderer:
-        for state in random_states(5, seed=6):
+        for state in random_states(at_night(5, fast=2), seed=6):
             frame = renderer.render(state)
             assert measured_angle(frame) == pytest.approx(state[2], abs=math.radians(1))
             assert measured_position(frame) == pytest.approx(state[0], abs=0.02 * 4.8)
@@ -141,7 +142,7 @@ def test_the_fan_is_faint_and_moves_with_the_cart(renderer):
         assert np.abs(outside - background).max() < 3
 
 
-@pytest.mark.parametrize("quality", ["draft", "normal", "high"])
+@pytest.mark.parametrize("quality", few(["draft", "normal", "high"], "draft", "high"))
 def test_a_part_that_is_drawn_again_equals_a_whole_picture(cartpole, quality):
     """Only a box is drawn for each frame; but for rounding nobody can tell."""
     if (backend := gl.find_backend()) is None:
@@ -324,7 +325,7 @@ with open_renderer(load_model(), kind=kind) as renderer:
     assert renderer.kind == kind
     numpy.save(path, [renderer.render(state) for state in numpy.load(states)])
 """
-    states = random_states(8, seed=8)
+    states = random_states(at_night(8, fast=3), seed=8)
     np.save(tmp_path / "states.npy", states)
     with open_renderer(cartpole, kind="sketch") as sketch:
         frames = {"sketch": np.array([sketch.render(state) for state in states], float)}

@@ -10,7 +10,7 @@ from gymnasium.utils.env_match import check_environments_match
 
 from mjcartpole.physics.load import load_model
 from mjcartpole.task import CARTPOLE_V1
-from nightly import few
+from nightly import at_night, few
 
 KINEMATICS = {"gym": "euler", "mujoco": "semi-implicit"}
 
@@ -86,7 +86,7 @@ def test_teacher_forced_transitions(integrator, sutton_barto):
     ours, reference = (env.unwrapped for env in pair(integrator, sutton_barto_reward=sutton_barto))
     rng = np.random.default_rng(12)
     box = np.array([2.5, 4.0, 0.22, 4.0])
-    for _ in range(5_000):
+    for _ in range(at_night(5_000, fast=1_000)):
         state, action = rng.uniform(-box, box), int(rng.integers(2))
         set_state(ours, state)
         set_state(reference, state)
@@ -100,7 +100,7 @@ def test_teacher_forced_transitions(integrator, sutton_barto):
 @pytest.mark.parametrize("integrator", ["gym", "mujoco"])
 def test_whole_episodes_over_the_meaningful_horizon(integrator):
     """Rounding grows by about e^(3.8 t): 1e-16 is 1e-9 after 200 steps, far below float32."""
-    for seed in range(20):
+    for seed in range(at_night(20, fast=6)):
         ours, reference = pair(integrator)
         check_environments_match(ours, reference, num_steps=100, seed=seed, skip_render=True)
 

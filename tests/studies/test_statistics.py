@@ -1,5 +1,6 @@
 """Averages and intervals over few runs: by hand, against scipy, by simulation."""
 
+import functools
 import itertools
 import json
 import re
@@ -12,6 +13,7 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from mjcartpole.errors import ConfigError
+from mjcartpole.studies import statistics
 from mjcartpole.studies.statistics import (
     Interval,
     aggregate,
@@ -192,6 +194,18 @@ def test_the_seed_decides():
         lambda seed: aggregate(scores, solved_at=0, seed=seed).interval,
     ):
         assert make(3) == make(3) != make(4)
+
+
+@pytest.mark.parametrize("block", [1, 100, 10_000])
+@pytest.mark.parametrize("m", [None, 3])
+def test_all_at_once_is_one_after_the_other(block, m, monkeypatch):
+    """However many are drawn at once: the draws are the same, and so is each mean, bit for bit."""
+    scores, rivals = spread(9, m), spread(7, m, seed=1)
+    expected = bootstrap_interval(scores, functools.partial(iqm), resamples=60)
+    better = improvement_interval(scores, rivals, resamples=60)
+    monkeypatch.setattr(statistics, "BLOCK", block)
+    assert bootstrap_interval(scores, resamples=60) == expected
+    assert improvement_interval(scores, rivals, resamples=60) == better
 
 
 def test_no_global_generator_is_touched():

@@ -250,4 +250,4 @@ def _play(
 def _interval(returns: npt.NDArray[np.float64], seed: int) -> Interval:
     if (returns == returns[0]).all():
         return Interval(float(returns[0]), float(returns[0]))
-    return bootstrap_interval(returns, lambda sample: float(sample.mean()), seed=seed)
+    return bootstrap_interval(returns, np.mean, seed=seed)
