@@ -76,7 +76,7 @@ def outcome(config, engine, cartpole=None):
         "steps": snapshot.columns.steps.tolist(),
         "endings": [episode.ending for episode in training.log],
         "generators": (snapshot.env_rng, snapshot.learner_rng),
-        "policy": training.result().policy.actions.tolist(),
+        "policy": training.result().policy.choices.tolist(),
         "error": error,
     }
 

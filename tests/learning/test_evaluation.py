@@ -68,10 +68,10 @@ def test_a_policy_that_is_any_function_is_played_in_python():
 
 def test_evaluating_changes_no_policy():
     policy = train(TrainConfig(episodes=20)).policy
-    table, actions = policy.q_table.copy(), policy.actions.copy()
+    table, actions = policy.q_table.copy(), policy.choices.copy()
     evaluate(policy, episodes=3)
     assert policy.q_table.tobytes() == table.tobytes()
-    assert policy.actions.tobytes() == actions.tobytes()
+    assert policy.choices.tobytes() == actions.tobytes()
 
 
 @pytest.mark.parametrize("engine", ["compiled", "python"])

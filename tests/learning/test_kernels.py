@@ -19,7 +19,7 @@ from numba.core.registry import cpu_target
 
 from mjcartpole import task
 from mjcartpole.learning import compiled as compiled_engine
-from mjcartpole.learning import discretizer, episodes, kernels, schedules, stepping
+from mjcartpole.learning import discretizer, episodes, kernels, schedules, stepping, tiles
 from mjcartpole.learning.compiled import _arrays
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.discretizer import Discretizer
@@ -85,6 +85,9 @@ def learning(act, after_step, after_episode):
     return learn
 
 
+FOUR_STATES = discretizer.Discretizer((4,), (-1.0,), (1.0,))
+
+
 @functools.cache
 def both(name):
     """Return the loop of a method in Python, and compiled."""
@@ -107,7 +110,7 @@ def test_every_method_learns_the_same_compiled(
     values["ties"] = "random" if ties else "first"
     found = []
     for function in both(name):
-        learner = Learner(TrainConfig(method=name, **values), 4)
+        learner = Learner(TrainConfig(method=name, **values), FOUR_STATES)
         learner.memory.q_table[:] = table
         rates = learner.method.begin_episode(learner.p, learner.memory, 3, 10)
         places = np.array(visited)
@@ -147,7 +150,8 @@ def test_the_checksum_covers_all_that_is_compiled_from_elsewhere():
         functions = [value.py_func for value in vars(module).values() if hasattr(value, "py_func")]
         elsewhere |= {function.__module__ for function in functions}
     methods = {method.__name__ for method in METHODS.values()}
-    shared = (cartpole_v1, discretizer, episodes, schedules, stepping, action_values, experience)
+    shared = (cartpole_v1, discretizer, episodes, schedules, stepping, tiles)
+    shared += (action_values, experience)
     covered = {module.__name__ for module in (*shared, kernels, task)} | methods
     assert elsewhere <= covered
     assert kernels._sources(one_per_step) != kernels._sources(minus_one_at_the_end)

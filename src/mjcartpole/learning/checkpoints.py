@@ -125,7 +125,7 @@ def load_checkpoint(
     Raises:
         CheckpointError: It is not there, damaged, or of another training.
     """
-    memory = Learner(config, config.discretizer(poles).n_learned).memory
+    memory = Learner(config, config.discretizer(poles)).memory
     most = sum(array.nbytes for array in memory) + config.episodes * _EPISODE_BYTES + _FRAME
     most += 8 * _most_numbers(config)
     with opened(path, most, refusal=CheckpointError) as file:

@@ -162,7 +162,7 @@ class CompiledLoop:
         """
         log = EpisodeLog(episodes)
         grid = _arrays(policy.discretizer.grid)
-        common = (self._physics, self._rules, grid, policy.actions, env_rng)
+        common = (self._physics, self._rules, grid, policy.tiles, policy.choices, env_rng)
         while len(log) < episodes:
             number = _run(
                 kernels.play_chunk(self._task.reward),

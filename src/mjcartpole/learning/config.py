@@ -247,7 +247,7 @@ class TrainConfig:
                     f"give {_DIMENSIONS}{also} ({', '.join(state_names(poles))})"
                 )
         bins, low, high = (_for_each_pole(getattr(self, name), poles) for name in _GRID)
-        return Discretizer(bins, low, high, self.mirror)
+        return Discretizer(bins, low, high, self.mirror, self.values().get("tilings", 1))
 
     @property
     def evaluation_period(self) -> int | None:

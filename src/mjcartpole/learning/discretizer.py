@@ -14,6 +14,9 @@ from mjcartpole.errors import ConfigError
 MAX_STATES = 1_000_000
 """More rows than anybody can visit; a table beyond this is taken for a slip of the finger."""
 
+TILINGS: Final = (1, 2, 4, 8, 16, 32, 64)
+"""How many grids there may be: powers of two are told apart without a division."""
+
 UNFOLDED: Final = 2**62
 """More states than any grid has: none of its rows stands for another one."""
 
@@ -73,13 +76,15 @@ class Discretizer:
         low: Lower end of the grid per dimension (m, m/s, rad, rad/s).
         high: Upper end.
         mirror: Whether a learner takes a state and its mirror image for the same one.
-        grid: The same for `row_of`.
+        tilings: How many such grids, each a little offset, are summed (see tiles.py).
+        grid: The same for `row_of`; of several tilings the fine one that all their edges make.
     """
 
     bins: tuple[int, ...]
     low: tuple[float, ...]
     high: tuple[float, ...]
     mirror: bool = False
+    tilings: int = 1
     grid: Grid = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -89,21 +94,33 @@ class Discretizer:
         low = tuple(float(self.low[dimension]) for dimension in used)
         high = tuple(float(self.high[dimension]) for dimension in used)
         width = tuple((b - a) / n for n, a, b in zip(bins, low, high, strict=True))
-        folding = self.n_states if self.mirror else UNFOLDED
+        if self.tilings > 1:
+            low = tuple(a + (w - w / self.tilings) / 2 for a, w in zip(low, width, strict=True))
+            bins = tuple((n - 1) * self.tilings + 1 for n in bins)
+            width = tuple(w / self.tilings for w in width)
+            high = tuple(a + n * w for a, n, w in zip(low, bins, width, strict=True))
+        folding = math.prod(bins) if self.mirror else UNFOLDED
         object.__setattr__(self, "grid", Grid(used, bins, low, high, width, folding))
 
     @property
     def n_states(self) -> int:
-        """Number of rows."""
-        return math.prod(self.bins)
+        """Number of states that are told apart."""
+        return math.prod(self.grid.bins)
 
     @property
-    def n_learned(self) -> int:
-        """Number of rows that a learner needs: with `mirror` half of all, and the middle one."""
+    def n_rows(self) -> int:
+        """Number of rows of a learner's table: of a mirrored grid half, and the middle one."""
+        if self.tilings > 1:
+            return self.tilings * math.prod(self.bins)
         return -(-self.n_states // 2) if self.mirror else self.n_states
 
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Shape of a policy's table, but for the actions."""
+        return self.bins if self.tilings == 1 else (self.tilings, *self.bins)
+
     def __call__(self, values: Sequence[float]) -> int:
-        """Row of an observation, counted as in a C-ordered array of shape `bins`.
+        """State of an observation; of one grid its row in a C-ordered array of shape `bins`.
 
         Args:
             values: The observation as plain floats, shape (d,).
@@ -115,12 +132,12 @@ class Discretizer:
         return folded(row_of(values, self.grid), self.grid.folding)
 
     def unfolded(self, learned: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-        """Return the values of both actions in all states, shape (n_states, 2), from those learned.
+        """Return the values of both actions in all rows of one grid, from those learned.
 
         Args:
-            learned: Shape (n_learned, 2).
+            learned: Shape (n_rows, 2).
         """
-        images = learned[: self.n_states - self.n_learned]
+        images = learned[: self.n_states - self.n_rows]
         return np.concatenate([learned, images[::-1, ::-1]])
 
     def _check(self) -> None:
@@ -144,10 +161,17 @@ class Discretizer:
                     "mirror needs ranges that are as long to the left as to the right; "
                     f"{low!r} to {high!r} is not"
                 )
-        if self.n_states > MAX_STATES:
+        if self.tilings not in TILINGS:
+            known = ", ".join(map(str, TILINGS))
+            raise ConfigError(f"tilings must be one of {known}, not {self.tilings!r}")
+        rows = self.tilings * math.prod(self.bins)
+        if rows > MAX_STATES:
+            times = f" in {self.tilings} tilings" if self.tilings > 1 else ""
             raise ConfigError(
-                f"bins {self.bins} make {self.n_states} states; the most is {MAX_STATES}"
+                f"bins {self.bins}{times} make {rows} states; the most is {MAX_STATES}"
             )
+        if math.prod((n - 1) * self.tilings + 1 for n in self.bins) >= UNFOLDED:
+            raise ConfigError(f"bins {self.bins} in {self.tilings} tilings are too many to count")
 
 
 def is_finite(value: object) -> bool:

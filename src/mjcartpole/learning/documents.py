@@ -18,6 +18,7 @@ _ADDED: Final = {
     "mirror": False,
     "evaluate_every": None,
     "until": None,
+    "tilings": 1,
 }
 """Fields that configs of version 0.1 lack, and what they stood for."""
 _SUMMARY_FIELDS: Final[Fields] = {
@@ -67,9 +68,9 @@ def read_values(values: dict[str, Any]) -> TrainConfig:
     Raises:
         ValueError: They are none.
     """
-    values = _ADDED | values
-    fields = config_class(str(values["method"])).fields()
-    return TrainConfig(**checked(values, fields))
+    fields = config_class(str(values.get("method", DEFAULT_METHOD))).fields()
+    added = {name: value for name, value in _ADDED.items() if name in fields}
+    return TrainConfig(**checked(added | values, fields))
 
 
 def read_summary(folder: Path) -> dict[str, Any]:

@@ -21,7 +21,7 @@ from numba import types
 from numba.extending import register_jitable
 
 from mjcartpole import task
-from mjcartpole.learning import discretizer, episodes, schedules, stepping
+from mjcartpole.learning import discretizer, episodes, schedules, stepping, tiles
 from mjcartpole.learning.discretizer import Grid
 from mjcartpole.learning.episodes import Columns
 from mjcartpole.learning.methods import action_values, experience
@@ -113,7 +113,8 @@ def _play_episode(
     physics: Physics,
     rules: Rules,
     grid: Grid,
-    actions: npt.NDArray[np.int64],
+    tiling: Any,
+    choices: Any,
     rng: np.random.Generator,
     failure: Floats,
 ) -> tuple[float, int, int]:
@@ -121,7 +122,8 @@ def _play_episode(
     state = begin(physics, rules, rng)
     total, steps, over, terminated = 0.0, 0, False, False
     while not over:
-        state = advance(physics, state, actions[_row_of(observe(physics, state), grid)])
+        s = _row_of(observe(physics, state), grid)
+        state = advance(physics, state, _greedy(tiling, choices, s, grid.folding))
         terminated = is_over(rules, state)
         if terminated and has_diverged(state):
             note(physics, state, steps, failure)
@@ -222,18 +224,19 @@ def play_chunk(reward: task.Reward) -> Callable[..., int]:
         physics: Physics,
         rules: Rules,
         grid: Grid,
-        actions: npt.NDArray[np.int64],
+        tiling: Any,
+        choices: Any,
         rng: np.random.Generator,
         numbers: tuple[int, int],
         most_steps: int,
         columns: Columns,
         failure: Floats,
     ) -> int:
-        """Do the same as `learn_chunk` without learning; `actions[row]` is taken."""
+        """Do the same as `learn_chunk` without learning; for the choices see `tiles.greedy`."""
         _ = sources
         all_steps = 0
         for number in range(numbers[0], numbers[1]):
-            played = _play_episode(reward, physics, rules, grid, actions, rng, failure)
+            played = _play_episode(reward, physics, rules, grid, tiling, choices, rng, failure)
             _log(columns, number, played)
             all_steps += played[1]
             if played[2] == DIVERGED:
@@ -261,6 +264,9 @@ def _compilable(function: Any) -> Any:
 def _globals_of(function: FunctionType) -> list[Any]:
     names = function.__code__.co_names
     return [function.__globals__[name] for name in names if name in function.__globals__]
+
+
+_greedy = compiled(_compilable(tiles.greedy))
 
 
 @functools.cache
@@ -305,6 +311,7 @@ _SHARED: Final = (
     schedules,
     stepping,
     task,
+    tiles,
     action_values,
     experience,
 )

@@ -6,8 +6,10 @@ import numpy as np
 import numpy.typing as npt
 
 from mjcartpole.learning.config import TrainConfig
+from mjcartpole.learning.discretizer import Discretizer
 from mjcartpole.learning.methods import method_named
 from mjcartpole.learning.methods.parameters import numbers_of
+from mjcartpole.learning.tiles import tiles_of
 
 STREAM: Final = 1
 """Spawn key of the learner's generator: its draws are independent of the env's."""
@@ -24,22 +26,22 @@ class Learner:
         episodes: How many episodes the whole training has: schedules need it.
     """
 
-    def __init__(self, config: TrainConfig, n_states: int) -> None:
+    def __init__(self, config: TrainConfig, discretizer: Discretizer) -> None:
         """Begin with what has learned nothing.
 
         Args:
             config: What is trained.
-            n_states: Rows of the table.
+            discretizer: From observations to the method's states.
         """
         self.method: Any = method_named(config.method)
-        self.p = numbers_of(config, self.method.Numbers)
+        self.p = numbers_of(config, self.method.Numbers, tiles_of(discretizer))
         self.rng = np.random.default_rng(np.random.SeedSequence(config.seed, spawn_key=(STREAM,)))
-        self.memory = self.method.make_memory(self.p, n_states, self.rng)
+        self.memory = self.method.make_memory(self.p, discretizer.n_rows, self.rng)
         self.episodes = config.episodes
 
     @property
     def greedy_values(self) -> npt.NDArray[np.float64]:
-        """Values of both actions, shape (n_states, 2), by which a policy decides."""
+        """Values of both actions, shape (n_rows, 2), by which a policy decides."""
         values: npt.NDArray[np.float64] = self.method.greedy_values(self.memory)
         return values
 

@@ -4,6 +4,7 @@ The file is JSON: a format, a version, a checksum, the grid and the table. It ho
 so reading it runs no code. Floats are written so that they read back bit for bit.
 """
 
+import dataclasses
 import hashlib
 import json
 import os
@@ -19,10 +20,12 @@ from mjcartpole.errors import ConfigError, PolicyFileError
 from mjcartpole.files import brief, read_bytes, write_whole
 from mjcartpole.learning.discretizer import Discretizer
 from mjcartpole.learning.stored import checked, parse
+from mjcartpole.learning.tiles import Tiles, greedy, pair_at, tiles_of
 from mjcartpole.task import N_ACTIONS, in_words, state_names
 
 FORMAT = "mjcartpole-policy"
-VERSION = 1
+VERSION, TILED_VERSION = 1, 2
+"""Of a file with one grid, and with several tilings."""
 
 _MOST_BYTES: Final = 2**26
 """The largest table, with all digits, takes 56 MB."""
@@ -36,24 +39,28 @@ _FIELDS: Final = {
     "high": tuple[float, ...],
     "q_table": tuple[tuple[float, ...], ...],
 }
+_TILED_FIELDS: Final = {"tilings": int, "mirror": bool}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Policy:
-    """Takes the better action of the observation's row; action 0 between equals.
+    """Takes the better action of the observation's state; action 0 between equals.
 
     Attributes:
-        discretizer: From observations to rows.
-        q_table: Action values, shape (*bins, 2), float64.
-        actions: The better action of each row, shape (n_states,), int64.
+        discretizer: From observations to states.
+        q_table: Action values, float64, shape (*bins, 2); of several tilings (tilings, *bins, 2).
+        tiles: How those are summed; None for one grid.
+        choices: What `greedy` looks at: of one grid the better action of each row, shape
+            (n_states,), int64; of several tilings the flat table.
     """
 
     discretizer: Discretizer
     q_table: npt.NDArray[np.float64]
-    actions: npt.NDArray[np.int64] = field(init=False)
+    tiles: Tiles | None = field(init=False)
+    choices: npt.NDArray[Any] = field(init=False)
 
     def __post_init__(self) -> None:
-        expected = (*self.discretizer.bins, N_ACTIONS)
+        expected = (*self.discretizer.shape, N_ACTIONS)
         if self.q_table.shape != expected:
             raise ConfigError(
                 f"a table for bins {self.discretizer.bins} has shape {expected}, "
@@ -61,19 +68,42 @@ class Policy:
             )
         if not np.isfinite(self.q_table).all():
             raise ConfigError("a table's values must be finite; this one has NaN or infinity in it")
-        # The first maximum wins, as in numpy's argmax.
-        actions = np.argmax(self.q_table.reshape(-1, N_ACTIONS), axis=1).astype(np.int64)
-        object.__setattr__(self, "actions", actions)
-        object.__setattr__(self, "_actions", actions.tolist())
+        object.__setattr__(self, "tiles", tiles_of(self.discretizer))
+        choices = self.q_table.reshape(-1)
+        if self.tiles is None:
+            # The first maximum wins, as in numpy's argmax.
+            choices = np.argmax(self.q_table.reshape(-1, N_ACTIONS), axis=1).astype(np.int64)
+        object.__setattr__(self, "choices", choices)
+        object.__setattr__(self, "_choices", choices.tolist())
+
+    @classmethod
+    def learned(cls, discretizer: Discretizer, values: npt.NDArray[np.float64]) -> "Policy":
+        """Return the policy of a learner's greedy values, shape (n_rows, 2), which are copied.
+
+        A mirrored grid is written out; of several tilings the fold stays, for they are no mirror
+        images of each other.
+        """
+        if discretizer.tilings == 1:
+            values = discretizer.unfolded(values)
+            discretizer = dataclasses.replace(discretizer, mirror=False)
+        return cls(discretizer, values.reshape(*discretizer.shape, N_ACTIONS).copy())
 
     def __call__(self, observation: npt.NDArray[np.float32] | Sequence[float]) -> int:
         """Action for an observation, one value per dimension of the grid."""
         values = observation.tolist() if isinstance(observation, np.ndarray) else observation
-        action: int = self._actions[self.discretizer(values)]  # type: ignore[attr-defined]
-        return action
+        choices: Any = self._choices  # type: ignore[attr-defined]
+        return greedy(self.tiles, choices, self.discretizer(values), self.discretizer.grid.folding)
+
+    def values(self, observation: npt.NDArray[np.float32]) -> tuple[float, float]:
+        """Return the values of both actions for an observation."""
+        s, mirrored = self.discretizer.folded(observation.tolist())
+        left, right = pair_at(self.tiles, self.q_table.reshape(-1), s)
+        return (float(right), float(left)) if mirrored else (float(left), float(right))
 
     def __repr__(self) -> str:
-        return f"Policy(bins={self.discretizer.bins}, {self.discretizer.n_states:,} states)"
+        grid = self.discretizer
+        tilings = f"tilings={grid.tilings}, " if grid.tilings > 1 else ""
+        return f"Policy({tilings}bins={grid.bins}, {grid.n_states:,} states)"
 
     @property
     def poles(self) -> int:
@@ -128,14 +158,17 @@ class Policy:
 
 
 def _to_text(policy: Policy) -> str:
+    grid = policy.discretizer
     content: dict[str, Any] = {
-        "bins": list(policy.discretizer.bins),
-        "low": list(policy.discretizer.low),
-        "high": list(policy.discretizer.high),
+        "bins": list(grid.bins),
+        "low": list(grid.low),
+        "high": list(grid.high),
+        **({"tilings": grid.tilings, "mirror": grid.mirror} if grid.tilings > 1 else {}),
         "q_table": policy.q_table.reshape(-1, N_ACTIONS).tolist(),
     }
     checksum = hashlib.sha256(json.dumps(content).encode()).hexdigest()
-    head = {"format": FORMAT, "version": VERSION, "sha256": checksum}
+    version = VERSION if grid.tilings == 1 else TILED_VERSION
+    head = {"format": FORMAT, "version": version, "sha256": checksum}
     # One line per row of the table: a person can read it, a diff can show it.
     rows = ",\n".join(f"  {json.dumps(row)}" for row in content.pop("q_table"))
     lines = [f'"{key}": {json.dumps(value)},' for key, value in {**head, **content}.items()]
@@ -149,20 +182,22 @@ def _from_json(content: bytes, path: str | os.PathLike[str]) -> Policy:
         raise _no_policy(path, f"it is not JSON, or is cut off ({brief(error)})") from error
     if not isinstance(document, dict) or document.get("format") != FORMAT:
         raise _no_policy(path, f'it lacks \'"format": "{FORMAT}"\'')
-    if document.get("version") != VERSION:
+    if (version := document.get("version")) not in (VERSION, TILED_VERSION):
         raise PolicyFileError(
-            f"policy file '{path}' has version {reprlib.repr(document.get('version'))}; "
-            f"this mjcartpole reads version {VERSION}"
+            f"policy file '{path}' has version {reprlib.repr(version)}; "
+            f"this mjcartpole reads versions {VERSION} and {TILED_VERSION}"
         )
     try:
-        checked(document, _FIELDS)
+        checked(document, _FIELDS if version == VERSION else _FIELDS | _TILED_FIELDS)
         discretizer = Discretizer(
             bins=tuple(document["bins"]),
             low=tuple(float(value) for value in document["low"]),
             high=tuple(float(value) for value in document["high"]),
+            mirror=document.get("mirror", False),
+            tilings=document.get("tilings", 1),
         )
         table = np.array(document["q_table"], dtype=np.float64)
-        return Policy(discretizer, table.reshape(*discretizer.bins, N_ACTIONS))
+        return Policy(discretizer, table.reshape(*discretizer.shape, N_ACTIONS))
     except (ValueError, OverflowError) as error:
         raise PolicyFileError(f"policy file '{path}' is damaged: {brief(error)}") from error
 

@@ -55,7 +55,7 @@ def write_events(folder: Path, result: TrainResult) -> None:
 
 def _points(result: TrainResult) -> Iterator[tuple[int, dict[str, float]]]:
     """Yield numbers of episodes, with values by the names of their curves."""
-    learner, returns = Learner(result.config, 1), result.returns
+    learner, returns = Learner(result.config, result.policy.discretizer), result.returns
     begin_episode = learner.method.begin_episode
     for block in np.array_split(np.arange(len(returns)), min(POINTS, max(len(returns), 1))):
         if block.size:

@@ -1,6 +1,5 @@
 """From a `TrainConfig` to a `TrainResult`."""
 
-import dataclasses
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -11,7 +10,6 @@ import numpy as np
 import numpy.typing as npt
 from gymnasium.utils import seeding
 
-from mjcartpole import task
 from mjcartpole.envs.backend import make_env
 from mjcartpole.errors import ConfigError, SimulationError
 from mjcartpole.learning.config import TrainConfig
@@ -136,7 +134,7 @@ class Training:
         self.discretizer = config.discretizer(_count_poles(cartpole, env))
         if config.mirror:
             check_symmetric(cartpole, config.integrator, task=config.rules)
-        self.learner = Learner(config, self.discretizer.n_learned)
+        self.learner = Learner(config, self.discretizer)
         self.log = EpisodeLog(config.episodes)
         self.evaluations: tuple[GreedyPoint, ...] = ()
         self._cartpole = cartpole
@@ -227,9 +225,7 @@ class Training:
         )
 
     def _policy(self) -> Policy:
-        grid = dataclasses.replace(self.discretizer, mirror=False)
-        values = self.discretizer.unfolded(self.learner.greedy_values)
-        return Policy(grid, values.reshape(*grid.bins, task.N_ACTIONS))
+        return Policy.learned(self.discretizer, self.learner.greedy_values)
 
     def snapshot(self) -> Snapshot:
         """All that is needed to go on from here; later episodes do not change it."""

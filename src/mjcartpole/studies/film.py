@@ -23,7 +23,7 @@ from mjcartpole.media.renderer import Renderer, open_renderer
 from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.load import ModelLike, load_model
 from mjcartpole.studies.video_options import VideoOptions
-from mjcartpole.task import CARTPOLE_V1, N_ACTIONS, Task, worst_pole
+from mjcartpole.task import CARTPOLE_V1, Task, worst_pole
 
 _ROUNDING: Final = 1e-6
 """More than what a place can be off by, in control steps."""
@@ -93,9 +93,9 @@ class Rollout:
         if step >= self.episode.steps:
             return Moment(self.episode.steps, self.episode.total, state)
         observation = self.states[step].astype(np.float32)
-        row = policy.discretizer(observation.tolist())
-        left, right = policy.q_table.reshape(-1, N_ACTIONS)[row].tolist()
-        return Moment(step, self.totals[step], state, policy(observation), (left, right))
+        return Moment(
+            step, self.totals[step], state, policy(observation), policy.values(observation)
+        )
 
 
 def play(setup: PolicySetup, episodes: int = 1) -> list[Rollout]:

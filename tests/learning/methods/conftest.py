@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from mjcartpole.learning.config import TrainConfig
+from mjcartpole.learning.discretizer import Discretizer
 from mjcartpole.learning.learner import Learner
 from mjcartpole.learning.methods.experience import Trajectory, Transition
 
@@ -13,7 +14,7 @@ class AtWork(Learner):
 
     def __init__(self, table, **values):
         config = TrainConfig(**{"alpha_final": 0.0, "epsilon_final": 0.0, "episodes": 20} | values)
-        super().__init__(config, len(table))
+        super().__init__(config, Discretizer((len(table),), (-1.0,), (1.0,)))
         self.q = self.memory.q_table
         self.q[:] = np.ravel(table)
         self.begin(0)

@@ -5,7 +5,9 @@ import pytest
 
 from mjcartpole.errors import ConfigError
 from mjcartpole.learning.config import TrainConfig
+from mjcartpole.learning.methods import q_learning
 from mjcartpole.learning.methods.action_values import choose, draw_table
+from mjcartpole.learning.methods.parameters import numbers_of
 
 
 def test_greedy_takes_the_better_action_and_the_first_of_equals(at_work):
@@ -29,6 +31,10 @@ def test_exploration_has_the_probability_of_epsilon(at_work):
     assert abs(share - 0.25) < 0.016
 
 
+def numbers(ties="first", **values):
+    return numbers_of(TrainConfig(ties=ties, **values), q_learning.Numbers)
+
+
 class Counting:
     """Stands in for a generator: gives what it is told to, and counts."""
 
@@ -50,16 +56,17 @@ class Counting:
 )
 def test_one_number_is_drawn_and_one_more_for_a_random_action(draws, epsilon, action):
     rng = Counting(*draws)
-    assert choose([9.0, 9.0, 1.0, 2.0], 1, epsilon, 1, rng) == action
+    assert choose(numbers("random"), [9.0, 9.0, 1.0, 2.0], 1, epsilon, rng) == action
     assert rng.values == []
 
 
 @pytest.mark.parametrize(
-    ("ties", "draws", "action"), [(0, (0.9,), 0), (1, (0.9, 0.2), 0), (1, (0.9, 0.7), 1)]
+    ("ties", "draws", "action"),
+    [("first", (0.9,), 0), ("random", (0.9, 0.2), 0), ("random", (0.9, 0.7), 1)],
 )
 def test_a_tie_is_drawn_where_that_is_asked_for(ties, draws, action):
     rng = Counting(*draws)
-    assert choose([0.0, 1.0, 3.0, 3.0], 1, 0.1, ties, rng) == action
+    assert choose(numbers(ties), [0.0, 1.0, 3.0, 3.0], 1, 0.1, rng) == action
     assert rng.values == []
 
 
@@ -71,5 +78,5 @@ def test_values_that_make_no_sense(method, name, value):
 
 
 def test_a_first_table_of_nothing_but_zeros_has_no_wrong_sign():
-    table = draw_table(TrainConfig(q_init_low=0.0, q_init_high=-0.0), 3, np.random.default_rng(0))
+    table = draw_table(numbers(q_init_low=0.0, q_init_high=-0.0), 3, np.random.default_rng(0))
     assert table.tolist() == [0.0] * 6

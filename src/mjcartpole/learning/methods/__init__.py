@@ -28,7 +28,7 @@ class Method(Protocol):
     Numbers: Any
     """The same for the functions: `numbers_class(Parameters, __name__)`."""
 
-    def make_memory(self, p: Any, n_states: int, rng: np.random.Generator) -> Any:
+    def make_memory(self, p: Any, n_rows: int, rng: np.random.Generator) -> Any:
         """Return a NamedTuple of flat arrays: all that learning changes."""
 
     def begin_episode(self, p: Any, memory: Any, number: int, episodes: int) -> Any:
@@ -48,7 +48,7 @@ class Method(Protocol):
         """Learn from a whole episode."""
 
     def greedy_values(self, memory: Any) -> npt.NDArray[np.float64]:
-        """Return the values of both actions, shape (n_states, 2), by which a policy decides."""
+        """Return the values of both actions, shape (n_rows, 2), by which a policy decides."""
 
 
 METHODS: Final[dict[str, Any]] = {

@@ -1,7 +1,4 @@
-"""Action values: what all methods share whose memory is one table Q(s, a).
-
-The table is flat: the values of state s are at 2 s and 2 s + 1.
-"""
+"""Action values: what all methods share whose memory is one table Q(s, a)."""
 
 from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple, TypeAlias
@@ -14,13 +11,11 @@ from mjcartpole.learning.discretizer import is_finite
 from mjcartpole.learning.methods.experience import Trajectory
 from mjcartpole.learning.methods.parameters import Parameters
 from mjcartpole.learning.schedules import linear
+from mjcartpole.learning.tiles import Table, add_at, pair_at
 from mjcartpole.task import N_ACTIONS
 
 Ties = Literal["first", "random"]
 """What to do between two actions of equal value: take action 0, or draw one."""
-
-Table: TypeAlias = "memoryview[float] | npt.NDArray[np.float64]"
-"""A flat table, shape (2 n_states,): the compiled loop has the array, Python a quicker view."""
 
 IntMemory: TypeAlias = "memoryview[int] | npt.NDArray[np.int64]"
 """Whole numbers that a method keeps."""
@@ -76,21 +71,30 @@ class ActionValueParameters(Parameters):
             )
 
 
+@dataclass(frozen=True, kw_only=True)
+class TiledParameters(ActionValueParameters):
+    """The same for a table that may consist of several offset grids."""
+
+    tilings: int = 1
+    """Sum so many grids, each a little offset (tile coding): 1, 2, 4, … 64."""
+
+
 class QTable(NamedTuple):
     """The memory of a method that learns one table."""
 
     q_table: Table
 
 
-def draw_table(p: Any, n_states: int, rng: np.random.Generator) -> npt.NDArray[np.float64]:
+def draw_table(p: Any, n_rows: int, rng: np.random.Generator) -> npt.NDArray[np.float64]:
     """Return a first table, flat, drawn uniformly from `q_init_low` to `q_init_high`."""
     # Without the sum, numpy calls 0.0 to -0.0 a range that runs backwards.
-    return rng.uniform(p.q_init_low, p.q_init_high + 0.0, size=n_states * N_ACTIONS)
+    table = rng.uniform(p.q_init_low, p.q_init_high + 0.0, size=n_rows * N_ACTIONS)
+    return table if p.tiles is None else table / (1 << p.tiles.bits)
 
 
-def make_memory(p: Any, n_states: int, rng: np.random.Generator) -> QTable:
+def make_memory(p: Any, n_rows: int, rng: np.random.Generator) -> QTable:
     """Return a table to begin with."""
-    return QTable(draw_table(p, n_states, rng))
+    return QTable(draw_table(p, n_rows, rng))
 
 
 def begin_episode(p: Any, memory: Any, number: int, episodes: int) -> Rates:
@@ -101,41 +105,47 @@ def begin_episode(p: Any, memory: Any, number: int, episodes: int) -> Rates:
 
 
 def greedy_values(memory: Any) -> npt.NDArray[np.float64]:
-    """Return the table, shape (n_states, 2)."""
+    """Return the table, shape (n_rows, 2)."""
     return np.asarray(memory.q_table).reshape(-1, N_ACTIONS)
 
 
-def choose(q: Table, s: int, epsilon: float, ties: int, rng: np.random.Generator) -> int:
+def choose(p: Any, q: Table, s: int, epsilon: float, rng: np.random.Generator) -> int:
     """Return an action: random with probability epsilon, else the better one.
 
     Args:
+        p: With `ties`: 0 takes the first of two equal actions, 1 draws one.
         q: Action values.
         s: The state.
         epsilon: Probability of a random action.
-        ties: 0 takes the first of two equal actions, 1 draws one.
         rng: Gives one number, and one more for a random action.
     """
     if rng.random() < epsilon:
         return int(rng.random() * N_ACTIONS)
-    left, right = q[2 * s], q[2 * s + 1]
-    if left == right and ties == 1:
+    left, right = pair_at(p.tiles, q, s)
+    if left == right and p.ties == 1:
         return int(rng.random() * N_ACTIONS)
     return 1 if right > left else 0
 
 
 def act(p: Any, memory: Any, rates: Rates, s: int, rng: np.random.Generator) -> int:
     """Return the epsilon-greedy action in a state."""
-    return choose(memory.q_table, s, rates.epsilon, p.ties, rng)
+    return choose(p, memory.q_table, s, rates.epsilon, rng)
 
 
-def best(q: Table, s: int) -> float:
+def value(p: Any, q: Table, s: int, a: int) -> float:
+    """Return the value of an action in a state."""
+    return pair_at(p.tiles, q, s)[a]
+
+
+def best(p: Any, q: Table, s: int) -> float:
     """Return the value of the better action in a state."""
-    return max(q[2 * s], q[2 * s + 1])
+    left, right = pair_at(p.tiles, q, s)
+    return max(left, right)
 
 
-def move_towards(q: Table, s: int, a: int, target: float, alpha: float) -> None:
+def move_towards(p: Any, q: Table, s: int, a: int, target: float, alpha: float) -> None:
     """Move the value of one action towards its target: Q(s, a) <- Q(s, a) + alpha (target - …)."""
-    q[2 * s + a] += alpha * (target - q[2 * s + a])
+    add_at(p.tiles, q, s, a, alpha * (target - value(p, q, s, a)))
 
 
 def learn_no_more(

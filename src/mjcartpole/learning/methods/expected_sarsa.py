@@ -15,12 +15,11 @@ from typing import Any
 import numpy as np
 
 from mjcartpole.learning.methods.action_values import (
-    ActionValueParameters,
     QTable,
     Rates,
+    TiledParameters,
     act,
     begin_episode,
-    best,
     greedy_values,
     learn_no_more,
     make_memory,
@@ -28,12 +27,13 @@ from mjcartpole.learning.methods.action_values import (
 )
 from mjcartpole.learning.methods.experience import Transition
 from mjcartpole.learning.methods.parameters import numbers_class
+from mjcartpole.learning.tiles import pair_at
 
 __all__ = ["act", "after_episode", "begin_episode", "greedy_values", "make_memory"]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Parameters(ActionValueParameters):
+class Parameters(TiledParameters):
     """Those of action values."""
 
 
@@ -49,6 +49,7 @@ def after_step(
         return
     q, target = memory.q_table, step.r
     if not step.terminated:
-        mean = (q[2 * step.s_next] + q[2 * step.s_next + 1]) / 2
-        target += p.gamma * ((1 - rates.epsilon) * best(q, step.s_next) + rates.epsilon * mean)
-    move_towards(q, step.s, step.a, target, rates.alpha)
+        left, right = pair_at(p.tiles, q, step.s_next)
+        mean, better = (left + right) / 2, max(left, right)
+        target += p.gamma * ((1 - rates.epsilon) * better + rates.epsilon * mean)
+    move_towards(p, q, step.s, step.a, target, rates.alpha)

@@ -34,25 +34,27 @@ class Parameters:
 
 
 def numbers_class(parameters: type[Parameters], module: str) -> Any:
-    """Return the NamedTuple of a method's parameters, as its functions see them.
+    """Return the NamedTuple of a method's parameters, as its functions see them, and `tiles`.
 
     Args:
         parameters: The dataclass.
         module: The method's `__name__`: Numba keeps compiled code under `<module>.Numbers`.
     """
     names = [field.name for field in dataclasses.fields(parameters)]
-    return collections.namedtuple("Numbers", names, module=module)
+    return collections.namedtuple("Numbers", [*names, "tiles"], module=module)
 
 
-def numbers_of(parameters: Any, numbers: Any) -> Any:
+def numbers_of(parameters: Any, numbers: Any, tiles: Any = None) -> Any:
     """Return parameters as numbers: of a choice its place, and -1 for None.
 
     Args:
         parameters: A `Parameters`, or a dataclass that has its fields.
         numbers: What `numbers_class` made.
+        tiles: The `Tiles` that a table consists of; None: it is one grid.
     """
     kinds = {field.name: field.type for field in dataclasses.fields(parameters)}
-    return numbers(*(_number(getattr(parameters, name), kinds[name]) for name in numbers._fields))
+    names = (name for name in numbers._fields if name != "tiles")
+    return numbers(*(_number(getattr(parameters, name), kinds[name]) for name in names), tiles)
 
 
 def _number(value: Any, kind: Any) -> float:

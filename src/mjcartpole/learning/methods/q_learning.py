@@ -19,9 +19,9 @@ from typing import Any
 import numpy as np
 
 from mjcartpole.learning.methods.action_values import (
-    ActionValueParameters,
     QTable,
     Rates,
+    TiledParameters,
     act,
     begin_episode,
     best,
@@ -36,7 +36,7 @@ __all__ = ["act", "begin_episode", "greedy_values", "make_memory"]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Parameters(ActionValueParameters):
+class Parameters(TiledParameters):
     """Those of action values, and lambda."""
 
     td_lambda: float | None = 0.9
@@ -64,8 +64,8 @@ def after_step(
         return
     target = step.r
     if not step.terminated:
-        target += p.gamma * best(memory.q_table, step.s_next)
-    move_towards(memory.q_table, step.s, step.a, target, rates.alpha)
+        target += p.gamma * best(p, memory.q_table, step.s_next)
+    move_towards(p, memory.q_table, step.s, step.a, target, rates.alpha)
 
 
 def after_episode(
@@ -77,9 +77,9 @@ def after_episode(
     q, lam = memory.q_table, p.td_lambda
     learned = episode.steps if p.learn_last_step else episode.steps - 1
     closed = episode.terminated and p.learn_last_step
-    future = 0.0 if closed else best(q, episode.states[learned])
+    future = 0.0 if closed else best(p, q, episode.states[learned])
     for t in range(learned - 1, -1, -1):
         s = episode.states[t]
         target = episode.rewards[t] + p.gamma * future
-        move_towards(q, s, episode.actions[t], target, rates.alpha)
-        future = (1 - lam) * best(q, s) + lam * target
+        move_towards(p, q, s, episode.actions[t], target, rates.alpha)
+        future = (1 - lam) * best(p, q, s) + lam * target

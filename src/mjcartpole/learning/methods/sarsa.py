@@ -14,25 +14,26 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mjcartpole.learning.methods.action_values import (
-    ActionValueParameters,
     IntMemory,
     Rates,
-    Table,
+    TiledParameters,
     begin_episode,
     choose,
     draw_table,
     greedy_values,
     learn_no_more,
     move_towards,
+    value,
 )
 from mjcartpole.learning.methods.experience import Transition
 from mjcartpole.learning.methods.parameters import numbers_class
+from mjcartpole.learning.tiles import Table
 
 __all__ = ["after_episode", "begin_episode", "greedy_values"]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Parameters(ActionValueParameters):
+class Parameters(TiledParameters):
     """Those of action values."""
 
 
@@ -48,16 +49,16 @@ class Memory(NamedTuple):
     """Shape (1,); -1 at the start of an episode."""
 
 
-def make_memory(p: Any, n_states: int, rng: np.random.Generator) -> Memory:
+def make_memory(p: Any, n_rows: int, rng: np.random.Generator) -> Memory:
     """Return a table to begin with, and no action."""
-    return Memory(draw_table(p, n_states, rng), np.array([-1], np.int64))
+    return Memory(draw_table(p, n_rows, rng), np.array([-1], np.int64))
 
 
 def act(p: Any, memory: Memory, rates: Rates, s: int, rng: np.random.Generator) -> int:
     """Return the action that was learned from, or at the start of an episode a new one."""
     if memory.next_action[0] >= 0:
         return memory.next_action[0]
-    return choose(memory.q_table, s, rates.epsilon, p.ties, rng)
+    return choose(p, memory.q_table, s, rates.epsilon, rng)
 
 
 def after_step(
@@ -66,10 +67,10 @@ def after_step(
     """Draw the next action, and learn from the one before."""
     q, target = memory.q_table, step.r
     if not step.terminated:
-        a_next = choose(q, step.s_next, rates.epsilon, p.ties, rng)
-        target += p.gamma * q[2 * step.s_next + a_next]
+        a_next = choose(p, q, step.s_next, rates.epsilon, rng)
+        target += p.gamma * value(p, q, step.s_next, a_next)
         memory.next_action[0] = a_next
     if step.over:
         memory.next_action[0] = -1
     if p.learn_last_step or not step.over:
-        move_towards(q, step.s, step.a, target, rates.alpha)
+        move_towards(p, q, step.s, step.a, target, rates.alpha)
