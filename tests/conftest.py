@@ -9,11 +9,7 @@ from hypothesis import HealthCheck, settings
 
 from command_line import QUICK, done
 from mjcartpole.physics.simulation import silence_mujoco
-from nightly import FAST
-
-# How long an example takes says how busy the machine is, and nothing of what is tested.
-settings.register_profile("untimed", deadline=None, suppress_health_check=[HealthCheck.too_slow])
-settings.load_profile("untimed")
+from nightly import FAST, examples
 
 
 @pytest.fixture(autouse=True)
@@ -47,6 +43,10 @@ def pytest_configure(config):
     """Say which set this is, and hear signals, which are ignored in the background or by nohup."""
     if config.option.markexpr == "not slow":
         os.environ[FAST] = "1"
+    # How long an example takes says how busy the machine is, and nothing of what is tested.
+    options = {"deadline": None, "suppress_health_check": [HealthCheck.too_slow]}
+    settings.register_profile("untimed", examples(100), **options)
+    settings.load_profile("untimed")
     signal.signal(signal.SIGINT, signal.default_int_handler)
     if hasattr(signal, "SIGHUP"):
         signal.signal(signal.SIGHUP, signal.SIG_DFL)

@@ -21,6 +21,7 @@ from mjcartpole.files import (
     remove_leftovers,
     write_whole,
 )
+from nightly import at_night
 
 
 def test_writes_and_replaces(tmp_path):
@@ -100,7 +101,7 @@ while True:
 def test_a_kill_leaves_the_old_file_or_the_new_one(tmp_path):
     path = tmp_path / "file.txt"
     write_whole(path, "0" * 200_000)
-    for attempt in range(8):
+    for attempt in range(0, 8, at_night(1, fast=3)):
         writer = subprocess.Popen(
             [sys.executable, "-c", WRITER, str(path)], stdout=subprocess.PIPE, text=True
         )

@@ -20,6 +20,7 @@ from mjcartpole.learning.evaluation import evaluate
 from mjcartpole.learning.training import train
 from mjcartpole.studies.film import PolicySetup, play
 from mjcartpole.task import TASKS, Task
+from nightly import few
 
 BACKENDS = ("mujoco", "gym")
 
@@ -60,7 +61,7 @@ def test_both_engines_learn_it_alike(backend):
     assert max(episode.steps for episode in compiled.episodes) <= NARROW.time_limit
 
 
-@pytest.mark.parametrize("backend", BACKENDS)
+@pytest.mark.parametrize("backend", few(BACKENDS, "mujoco"))
 def test_evaluation_and_film_agree(backend):
     policy = train(config(backend)).policy
     where = {"backend": backend, "task": NARROW, "episodes": 3, "seed": 5}
@@ -144,7 +145,7 @@ def run(*words: str) -> int:
     return ended.value.code
 
 
-@pytest.mark.parametrize("backend", BACKENDS)
+@pytest.mark.parametrize("backend", few(BACKENDS, "gym"))
 def test_the_command_line_trains_films_and_evaluates_it(backend, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     words = ["train", "--backend", backend, "--task", NARROW.name, "--episodes", "100"]

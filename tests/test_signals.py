@@ -99,7 +99,7 @@ def test_a_signal_that_is_ignored_stays_ignored(number):
 
 
 @pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="needs SIGHUP")
-@pytest.mark.parametrize("seeds", few(["1", "2"], "2"))
+@pytest.mark.parametrize("seeds", few(["1", "2"], "1"))
 def test_a_terminal_that_is_closed_ends_all_of_a_training_in_order(seeds, tmp_path):
     command = ["train", "--engine", "python", "--episodes", "100000", "--seeds", seeds]
     with subprocess.Popen(

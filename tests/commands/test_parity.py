@@ -88,7 +88,7 @@ def test_the_command_fails_with_1_and_says_why(tmp_path, capsys):
     assert "does not hold on rung 2, 3" in out
     assert out.splitlines()[-1] == "  gravity 9.81 instead of 9.8"
     assert "likely cause: gravity 9.81 instead of 9.8" in out
-    code, out, _ = call(["--model", str(path), "--against", "itself", "--rungs", "2", "3"], capsys)
+    code, out, _ = call(["--model", str(path), "--against", "itself", "--rungs", "2"], capsys)
     assert code == 0
 
 

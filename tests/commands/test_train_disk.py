@@ -11,6 +11,7 @@ import pytest
 
 from command_line import call
 from mjcartpole.learning.checkpoints import LATEST
+from nightly import few
 from trainings import SHORT, SLOW, assert_equal_runs, names, needs_proc, wait_until
 
 
@@ -78,15 +79,17 @@ def mounts(tmp_path_factory):
         pytest.skip("needs the right to mount a file system")
 
 
+RESUME, REPLACE = "--resume run", "--no-video --overwrite --run-dir run"
+
+
 @pytest.mark.usefixtures("mounts")
-def test_a_read_only_disk_is_one_line(killed):
-    train_it = f"{sys.executable} -m mjcartpole train"
-    read_only = f"mount --bind {killed} {killed}; mount -o remount,ro,bind {killed};"
-    for command in ("--resume run", "--no-video --overwrite --run-dir run"):
-        process = in_own_mounts(f"{read_only} {train_it} {command}")
-        assert (process.returncode, process.stdout) == (2, "")
-        assert process.stderr.count("\n") == 1
-        assert "Read-only file system" in process.stderr
+@pytest.mark.parametrize("flags", few([RESUME, REPLACE], RESUME))
+def test_a_read_only_disk_is_one_line(flags, killed):
+    read_only = f"mount --bind {killed} {killed}; mount -o remount,ro,bind {killed}"
+    process = in_own_mounts(f"{read_only}; {sys.executable} -m mjcartpole train {flags}")
+    assert (process.returncode, process.stdout) == (2, "")
+    assert process.stderr.count("\n") == 1
+    assert "Read-only file system" in process.stderr
 
 
 @pytest.mark.usefixtures("mounts")

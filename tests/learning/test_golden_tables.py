@@ -7,6 +7,7 @@ import pytest
 
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.training import train
+from nightly import few
 
 PRESETS = [
     (
@@ -77,7 +78,7 @@ def sha256(values: npt.NDArray) -> str:
 
 @pytest.mark.parametrize(
     ("config", "table", "returns"),
-    [*PRESETS, *(pytest.param(*case, marks=pytest.mark.slow) for case in LONG)],
+    few([*PRESETS, *LONG], *PRESETS[:2], *PRESETS[4:]),
     ids=lambda value: repr(value) if isinstance(value, TrainConfig) else "",
 )
 def test_a_table_is_the_one_that_was_learned_before(config, table, returns):

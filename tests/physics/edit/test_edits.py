@@ -21,7 +21,7 @@ from mjcartpole.physics.edit.edits import (
 from mjcartpole.physics.load import load_model
 from mjcartpole.physics.parameters import read_parameters
 from mjcartpole.physics.unmodelled_effects import differs_from
-from nightly import examples
+from nightly import at_night, examples
 
 REFERENCE = load_model("cartpole").xml
 BOB = load_model("bob").xml
@@ -254,6 +254,7 @@ def test_every_pair_of_edits_touches_only_its_own_lines():
         name: set(changed_lines(REFERENCE, edit_document(REFERENCE, {name: value})))
         for name, value in values.items()
     }
-    for a, b in itertools.combinations(values, 2):
+    pairs = list(itertools.combinations(values, 2))
+    for a, b in pairs[:: at_night(1, fast=5)]:
         lines = changed_lines(REFERENCE, edit_document(REFERENCE, {a: values[a], b: values[b]}))
         assert len(lines) <= len(alone[a]) + len(alone[b])
