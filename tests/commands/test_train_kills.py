@@ -46,6 +46,7 @@ def test_a_run_that_is_killed_again_and_again_ends_as_if_it_was_not(
 
 BEGINNINGS = {
     "one": SHORT,
+    "evaluated": [*SHORT, "--evaluate-every", "1"],
     "many": [*SHORT, "--engine", "compiled", "--seeds", "2", "--workers", "1"],
 }
 
