@@ -71,7 +71,7 @@ def outcome(config, engine, cartpole=None):
         error = str(diverged)
     snapshot = training.snapshot()
     return {
-        "table": snapshot.memory["q_table"].tobytes(),
+        "memory": {name: array.tobytes() for name, array in snapshot.memory.items()},
         "returns": snapshot.columns.totals.tolist(),
         "steps": snapshot.columns.steps.tolist(),
         "endings": [episode.ending for episode in training.log],

@@ -19,15 +19,14 @@ from numba.core.registry import cpu_target
 
 from mjcartpole import task
 from mjcartpole.learning import compiled as compiled_engine
-from mjcartpole.learning import discretizer, episodes, kernels, schedules, stepping, tiles
+from mjcartpole.learning import discretizer, episodes, kernels, schedules, stepping
 from mjcartpole.learning.compiled import _arrays
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.discretizer import Discretizer
 from mjcartpole.learning.learner import Learner
-from mjcartpole.learning.methods import METHODS, action_values, experience
+from mjcartpole.learning.methods import METHODS, action_values, n_step_sarsa, sarsa
 from mjcartpole.learning.methods.experience import Trajectory, Transition
 from mjcartpole.learning.stepping import compiled
-from mjcartpole.physics import cartpole_v1
 from mjcartpole.task import minus_one_at_the_end, one_per_step
 from nightly import examples
 
@@ -68,6 +67,9 @@ tables = st.lists(st.sampled_from([0.0, -0.0, 1.0]) | st.floats(-1e3, 1e3), min_
 rows = st.lists(st.integers(0, 3), min_size=1, max_size=30)
 
 
+CALLED = ("begin_episode", "act", "after_step", "after_episode")
+
+
 def learning(act, after_step, after_episode):
     """Return a loop without physics: it visits the rows that it is given."""
 
@@ -91,10 +93,9 @@ FOUR_STATES = discretizer.Discretizer((4,), (-1.0,), (1.0,))
 @functools.cache
 def both(name):
     """Return the loop of a method in Python, and compiled."""
-    names = ("act", "after_step", "after_episode")
     method = METHODS[name]
     kernels.learn_chunk(method, one_per_step)
-    loop = learning(*(getattr(method, each) for each in names))
+    loop = learning(*(getattr(method, each) for each in CALLED[1:]))
     return loop, numba.njit(error_model="numpy")(loop)
 
 
@@ -111,7 +112,9 @@ def test_every_method_learns_the_same_compiled(
     found = []
     for function in both(name):
         learner = Learner(TrainConfig(method=name, **values), FOUR_STATES)
-        learner.memory.q_table[:] = table
+        for array in learner.memory:
+            if array.dtype == float:
+                array[:] = np.resize(table, array.shape)
         rates = learner.method.begin_episode(learner.p, learner.memory, 3, 10)
         places = np.array(visited)
         function(learner.p, learner.memory, rates, places, terminated, learner.rng)
@@ -149,12 +152,17 @@ def test_the_checksum_covers_all_that_is_compiled_from_elsewhere():
     for module in (kernels, stepping):
         functions = [value.py_func for value in vars(module).values() if hasattr(value, "py_func")]
         elsewhere |= {function.__module__ for function in functions}
-    methods = {method.__name__ for method in METHODS.values()}
-    shared = (cartpole_v1, discretizer, episodes, schedules, stepping, tiles)
-    shared += (action_values, experience)
-    covered = {module.__name__ for module in (*shared, kernels, task)} | methods
-    assert elsewhere <= covered
+    reached = kernels._reached(*(getattr(m, each) for m in METHODS.values() for each in CALLED))
+    covered = {module.__name__ for module in (*kernels._SHARED, kernels)}
+    assert elsewhere <= covered | {function.__module__ for function in reached}
     assert kernels._sources(one_per_step) != kernels._sources(minus_one_at_the_end)
+
+
+def test_the_checksum_covers_what_a_method_borrows_from_another():
+    functions = (n_step_sarsa.after_step, n_step_sarsa.act, action_values.act)
+    texts = {kernels._sources(one_per_step, *functions[:n]) for n in range(4)}
+    assert n_step_sarsa.act is sarsa.act
+    assert len(texts) == 3  # those of action values come with the first
 
 
 SCALE = 2.0

@@ -21,10 +21,10 @@ from numba import types
 from numba.extending import register_jitable
 
 from mjcartpole import task
-from mjcartpole.learning import discretizer, episodes, schedules, stepping, tiles
+from mjcartpole.learning import discretizer, episodes, stepping, tiles
 from mjcartpole.learning.discretizer import Grid
 from mjcartpole.learning.episodes import Columns
-from mjcartpole.learning.methods import action_values, experience
+from mjcartpole.learning.methods import experience
 from mjcartpole.learning.methods.experience import Trajectory, Transition
 from mjcartpole.learning.stepping import (
     F,
@@ -160,10 +160,10 @@ def uncached(entry: Callable[..., int]) -> Callable[..., int]:
 @functools.cache
 def learn_chunk(method: Any, reward: task.Reward) -> Callable[..., int]:
     """Return the compiled loop that learns by a method, where this is the reward of a step."""
-    begin_episode, act = _compilable(method.begin_episode), _compilable(method.act)
-    after_step, after_episode = _compilable(method.after_step), _compilable(method.after_episode)
+    functions = (method.begin_episode, method.act, method.after_step, method.after_episode)
+    begin_episode, act, after_step, after_episode = map(_compilable, functions)
     _compilable(reward)
-    sources = _sources(reward, method)
+    sources = _sources(reward, *functions)
 
     def learn_chunk(
         physics: Physics,
@@ -253,12 +253,22 @@ _known: Final[set[FunctionType]] = set()
 
 def _compilable(function: Any) -> Any:
     """Let compiled code call a plain function, and the plain functions that this one calls."""
-    if isinstance(function, FunctionType) and function not in _known:
-        _known.add(function)
-        register_jitable(function)
-        for value in _globals_of(function):
-            _compilable(value)
+    for each in _reached(function) - _known:
+        _known.add(each)
+        register_jitable(each)
     return function
+
+
+def _reached(*functions: Any) -> set[FunctionType]:
+    """Return the plain functions among these, and those that they call."""
+    found: set[FunctionType] = set()
+    waiting = list(functions)
+    while waiting:
+        each = waiting.pop()
+        if isinstance(each, FunctionType) and each not in found:
+            found.add(each)
+            waiting += _globals_of(each)
+    return found
 
 
 def _globals_of(function: FunctionType) -> list[Any]:
@@ -287,8 +297,12 @@ def why_not_compilable(reward: task.Reward) -> str:
     return ""
 
 
-def _sources(reward: Any, *methods: Any) -> str:
+def _sources(reward: Any, *functions: Any) -> str:
     """Return a checksum of all that is compiled into an entry; nothing where that is not known.
+
+    Args:
+        reward: The reward of the task.
+        functions: Those of a method; all files count that have one of them, or one that they call.
 
     Numba keeps what it compiled until the file of the entry changes, and would not see that another
     file did. A value that an entry closes over is part of the cache's key.
@@ -297,8 +311,9 @@ def _sources(reward: Any, *methods: Any) -> str:
     # Functions and objects that a reward takes from elsewhere change without its own text.
     if reward.__closure__ or not all(type(each) in _PLAIN for each in constants):
         return ""
+    files = {inspect.getmodule(each) for each in _reached(*functions)}
     try:
-        texts = [inspect.getsource(each) for each in (*_SHARED, *methods, reward)]
+        texts = [inspect.getsource(each) for each in (*_SHARED, *sorted(files, key=repr), reward)]
     except (OSError, TypeError):
         return ""  # It was typed at a prompt.
     return hashlib.sha256("".join([*texts, repr((LARGEST_SANE, constants))]).encode()).hexdigest()
@@ -308,11 +323,9 @@ _SHARED: Final = (
     cartpole_v1,
     discretizer,
     episodes,
-    schedules,
     stepping,
     task,
     tiles,
-    action_values,
     experience,
 )
 _PLAIN: Final = {bool, int, float, type(math)}

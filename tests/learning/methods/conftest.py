@@ -37,6 +37,23 @@ class AtWork(Learner):
         episode = Trajectory(states, actions, rewards, len(actions), terminated)
         self.method.after_episode(self.p, self.memory, self.rates, episode, self.rng)
 
+    def play(self, world, episodes, seed=0):
+        """Learn from episodes in a world; returns them as lists of s, a, r, s_next, terminated."""
+        played, rng = [], np.random.default_rng(seed)
+        for number in range(episodes):
+            self.begin(number)
+            s, steps, terminated = world.start, [], False
+            while not terminated:
+                a = self.act(s)
+                r, s_next, terminated = world.step(s, a, rng)
+                self.step(s, a, r, s_next, terminated=terminated)
+                steps.append((s, a, r, s_next, terminated))
+                s = s_next
+            states = [step[0] for step in steps]
+            self.replay([*states, s], *zip(*[x[1:3] for x in steps], strict=True), terminated=True)
+            played.append(steps)
+        return played
+
 
 @pytest.fixture
 def at_work():

@@ -11,7 +11,13 @@ import numpy as np
 import numpy.typing as npt
 
 from mjcartpole.errors import check_known
-from mjcartpole.learning.methods import expected_sarsa, q_learning, sarsa
+from mjcartpole.learning.methods import (
+    double_q,
+    expected_sarsa,
+    n_step_sarsa,
+    q_learning,
+    sarsa,
+)
 from mjcartpole.learning.methods.experience import Trajectory, Transition
 from mjcartpole.learning.methods.parameters import Parameters
 
@@ -55,6 +61,8 @@ METHODS: Final[dict[str, Any]] = {
     "q-learning": q_learning,
     "sarsa": sarsa,
     "expected-sarsa": expected_sarsa,
+    "n-step-sarsa": n_step_sarsa,
+    "double-q": double_q,
 }
 """Every method by its name; each value is a `Method`."""
 

@@ -18,7 +18,8 @@ Ties = Literal["first", "random"]
 """What to do between two actions of equal value: take action 0, or draw one."""
 
 IntMemory: TypeAlias = "memoryview[int] | npt.NDArray[np.int64]"
-"""Whole numbers that a method keeps."""
+FloatMemory: TypeAlias = "memoryview[float] | npt.NDArray[np.float64]"
+"""Whole numbers, and others, that a method keeps."""
 
 
 class Rates(NamedTuple):
@@ -121,7 +122,12 @@ def choose(p: Any, q: Table, s: int, epsilon: float, rng: np.random.Generator) -
     """
     if rng.random() < epsilon:
         return int(rng.random() * N_ACTIONS)
-    left, right = pair_at(p.tiles, q, s)
+    return prefer(p, pair_at(p.tiles, q, s), rng)
+
+
+def prefer(p: Any, pair: tuple[float, float], rng: np.random.Generator) -> int:
+    """Return the better action by the values of both; of equals the first, or one that is drawn."""
+    left, right = pair
     if left == right and p.ties == 1:
         return int(rng.random() * N_ACTIONS)
     return 1 if right > left else 0
@@ -135,6 +141,12 @@ def act(p: Any, memory: Any, rates: Rates, s: int, rng: np.random.Generator) -> 
 def value(p: Any, q: Table, s: int, a: int) -> float:
     """Return the value of an action in a state."""
     return pair_at(p.tiles, q, s)[a]
+
+
+def better(p: Any, q: Table, s: int) -> int:
+    """Return the better action in a state, the first of equals."""
+    left, right = pair_at(p.tiles, q, s)
+    return 1 if right > left else 0
 
 
 def best(p: Any, q: Table, s: int) -> float:

@@ -1,0 +1,89 @@
+"""Double Q-learning: two tables, each valuing what the other thinks best.
+
+Van Hasselt (2010), "Double Q-learning", NeurIPS 23; Sutton and Barto (2018), section 6.7. A coin
+decides which table learns; if it is the first,
+
+    Q1(s, a)  <-  Q1(s, a) + alpha (r + gamma Q2(s', argmax_a' Q1(s', a')) - Q1(s, a))
+
+The maximum of one noisy table is too high on average, since it chooses by the same luck that it
+then takes for value; what the other table says of that action is not. It acts by the mean of both.
+After a terminated step the target is `r`; a truncated episode would have gone on, so it bootstraps.
+"""
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from mjcartpole.learning.methods.action_values import (
+    ActionValueParameters,
+    Rates,
+    Table,
+    begin_episode,
+    better,
+    draw_action,
+    draw_table,
+    learn_no_more,
+    move_towards,
+    value,
+)
+from mjcartpole.learning.methods.experience import Transition
+from mjcartpole.learning.methods.parameters import numbers_class
+from mjcartpole.task import N_ACTIONS
+
+__all__ = ["after_episode", "begin_episode"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Parameters(ActionValueParameters):
+    """Those of action values; a table that learns from half of the steps moves twice as far."""
+
+    alpha: float = 0.2
+    """Step size at the start."""
+    alpha_final: float = 0.02
+    """Step size once decayed."""
+
+
+Numbers = numbers_class(Parameters, __name__)
+after_episode = learn_no_more
+
+
+class Memory(NamedTuple):
+    """Both tables."""
+
+    q_table: Table
+    second: Table
+
+
+def make_memory(p: Any, n_states: int, rng: np.random.Generator) -> Memory:
+    """Return two tables to begin with."""
+    return Memory(draw_table(p, n_states, rng), draw_table(p, n_states, rng))
+
+
+def act(p: Any, memory: Memory, rates: Rates, s: int, rng: np.random.Generator) -> int:
+    """Return the epsilon-greedy action by both tables."""
+    left = value(memory.q_table, s, 0) + value(memory.second, s, 0)
+    right = value(memory.q_table, s, 1) + value(memory.second, s, 1)
+    return draw_action(left, right, rates.epsilon, p.ties, rng)
+
+
+def after_step(
+    p: Any, memory: Memory, rates: Rates, step: Transition, rng: np.random.Generator
+) -> None:
+    """Let one table learn from one step."""
+    if step.over and not p.learn_last_step:
+        return
+    q, other = memory.q_table, memory.second
+    if rng.random() < 0.5:
+        q, other = other, q
+    target = step.r
+    if not step.terminated:
+        target += p.gamma * value(other, step.s_next, better(q, step.s_next))
+    move_towards(q, step.s, step.a, target, rates.alpha)
+
+
+def greedy_values(memory: Memory) -> npt.NDArray[np.float64]:
+    """Return the mean of both tables, shape (n_states, 2)."""
+    both = np.stack([memory.q_table, memory.second])
+    return both.mean(axis=0).reshape(-1, N_ACTIONS)
