@@ -85,5 +85,5 @@ def after_step(
 
 def greedy_values(memory: Memory) -> npt.NDArray[np.float64]:
     """Return the mean of both tables, shape (n_states, 2)."""
-    both = np.stack([memory.q_table, memory.second])
-    return both.mean(axis=0).reshape(-1, N_ACTIONS)
+    mean: npt.NDArray[np.float64] = np.add(memory.q_table, memory.second) / 2
+    return mean.reshape(-1, N_ACTIONS)
