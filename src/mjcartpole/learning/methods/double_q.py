@@ -17,32 +17,34 @@ import numpy as np
 import numpy.typing as npt
 
 from mjcartpole.learning.methods.action_values import (
-    ActionValueParameters,
     Rates,
-    Table,
+    TiledParameters,
     begin_episode,
     better,
-    draw_action,
     draw_table,
     learn_no_more,
     move_towards,
+    prefer,
     value,
 )
 from mjcartpole.learning.methods.experience import Transition
 from mjcartpole.learning.methods.parameters import numbers_class
+from mjcartpole.learning.tiles import Table, pair_at
 from mjcartpole.task import N_ACTIONS
 
 __all__ = ["after_episode", "begin_episode"]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Parameters(ActionValueParameters):
+class Parameters(TiledParameters):
     """Those of action values; a table that learns from half of the steps moves twice as far."""
 
     alpha: float = 0.2
     """Step size at the start."""
     alpha_final: float = 0.02
     """Step size once decayed."""
+    decay: float = 0.8
+    """Share of the episodes over which alpha and epsilon fall, linearly."""
 
 
 Numbers = numbers_class(Parameters, __name__)
@@ -56,16 +58,17 @@ class Memory(NamedTuple):
     second: Table
 
 
-def make_memory(p: Any, n_states: int, rng: np.random.Generator) -> Memory:
+def make_memory(p: Any, n_rows: int, rng: np.random.Generator) -> Memory:
     """Return two tables to begin with."""
-    return Memory(draw_table(p, n_states, rng), draw_table(p, n_states, rng))
+    return Memory(draw_table(p, n_rows, rng), draw_table(p, n_rows, rng))
 
 
 def act(p: Any, memory: Memory, rates: Rates, s: int, rng: np.random.Generator) -> int:
     """Return the epsilon-greedy action by both tables."""
-    left = value(memory.q_table, s, 0) + value(memory.second, s, 0)
-    right = value(memory.q_table, s, 1) + value(memory.second, s, 1)
-    return draw_action(left, right, rates.epsilon, p.ties, rng)
+    if rng.random() < rates.epsilon:
+        return int(rng.random() * N_ACTIONS)
+    first, second = pair_at(p.tiles, memory.q_table, s), pair_at(p.tiles, memory.second, s)
+    return prefer(p, (first[0] + second[0], first[1] + second[1]), rng)
 
 
 def after_step(
@@ -79,11 +82,11 @@ def after_step(
         q, other = other, q
     target = step.r
     if not step.terminated:
-        target += p.gamma * value(other, step.s_next, better(q, step.s_next))
-    move_towards(q, step.s, step.a, target, rates.alpha)
+        target += p.gamma * value(p, other, step.s_next, better(p, q, step.s_next))
+    move_towards(p, q, step.s, step.a, target, rates.alpha)
 
 
 def greedy_values(memory: Memory) -> npt.NDArray[np.float64]:
-    """Return the mean of both tables, shape (n_states, 2)."""
+    """Return the mean of both tables, shape (n_rows, 2)."""
     mean: npt.NDArray[np.float64] = np.add(memory.q_table, memory.second) / 2
     return mean.reshape(-1, N_ACTIONS)

@@ -17,11 +17,10 @@ import numpy as np
 
 from mjcartpole.errors import ConfigError
 from mjcartpole.learning.methods.action_values import (
-    ActionValueParameters,
     FloatMemory,
     IntMemory,
     Rates,
-    Table,
+    TiledParameters,
     begin_episode,
     choose,
     draw_table,
@@ -33,6 +32,7 @@ from mjcartpole.learning.methods.action_values import (
 from mjcartpole.learning.methods.experience import Transition
 from mjcartpole.learning.methods.parameters import numbers_class
 from mjcartpole.learning.methods.sarsa import act
+from mjcartpole.learning.tiles import Table
 
 __all__ = ["act", "after_episode", "begin_episode", "greedy_values"]
 
@@ -41,9 +41,11 @@ MOST_STEPS = 10_000
 
 
 @dataclass(frozen=True, kw_only=True)
-class Parameters(ActionValueParameters):
+class Parameters(TiledParameters):
     """Those of action values, and n."""
 
+    decay: float = 0.8
+    """Share of the episodes over which alpha and epsilon fall, linearly."""
     n_steps: int = 8
     """Rewards that a target consists of before it bootstraps; 1 is SARSA."""
 
@@ -78,11 +80,11 @@ class Memory(NamedTuple):
     rewards: FloatMemory
 
 
-def make_memory(p: Any, n_states: int, rng: np.random.Generator) -> Memory:
+def make_memory(p: Any, n_rows: int, rng: np.random.Generator) -> Memory:
     """Return a table to begin with, and no steps."""
     none, n = np.zeros(1, np.int64), p.n_steps
     ring = np.zeros(n, np.int64)
-    return Memory(draw_table(p, n_states, rng), none - 1, none, ring, ring.copy(), np.zeros(n))
+    return Memory(draw_table(p, n_rows, rng), none - 1, none, ring, ring.copy(), np.zeros(n))
 
 
 def after_step(
@@ -94,13 +96,13 @@ def after_step(
     memory.states[slot], memory.actions[slot], memory.rewards[slot] = step.s, step.a, step.r
     a_next, target, kept = -1, 0.0, min(t + 1, n)
     if not step.terminated:
-        a_next = choose(q, step.s_next, rates.epsilon, p.ties, rng)
-        target = value(q, step.s_next, a_next)
+        a_next = choose(p, q, step.s_next, rates.epsilon, rng)
+        target = value(p, q, step.s_next, a_next)
     memory.steps[0], memory.next_action[0] = t + 1, a_next
     if step.over:
         memory.steps[0], memory.next_action[0] = 0, -1
         if not p.learn_last_step:
-            target, kept, slot = value(q, step.s, step.a), kept - 1, (slot - 1) % n
+            target, kept, slot = value(p, q, step.s, step.a), kept - 1, (slot - 1) % n
     if step.over or kept == n:
         _learn(p, memory, rates.alpha, target, slot, kept, step.over)
 
@@ -112,5 +114,6 @@ def _learn(
     for age in range(kept):
         target = memory.rewards[slot] + p.gamma * target
         if over or age == kept - 1:
-            move_towards(memory.q_table, memory.states[slot], memory.actions[slot], target, alpha)
+            s, a = memory.states[slot], memory.actions[slot]
+            move_towards(p, memory.q_table, s, a, target, alpha)
         slot = (slot if slot > 0 else p.n_steps) - 1
