@@ -39,6 +39,11 @@ def run(here, trained):
     return shutil.copytree(trained, here / "runs" / "mine")
 
 
+def pytest_collection_modifyitems(items):
+    """Begin with what takes longest, so that no worker is left alone with it at the end."""
+    items.sort(key=lambda item: item.path.name != "test_docs.py")
+
+
 def pytest_configure(config):
     """Say which set this is, and hear signals, which are ignored in the background or by nohup."""
     if config.option.markexpr == "not slow":

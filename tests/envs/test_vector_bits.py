@@ -12,13 +12,13 @@ from mjcartpole.envs.vector import CartPoleVectorEnv
 from mjcartpole.errors import (
     ConfigError,
 )
-from nightly import few
+from nightly import at_night, few
 from vectors import ENV_ID, MODELS, run
 
 
 @pytest.mark.parametrize("integrator", ["gym", "mujoco"])
 @pytest.mark.parametrize("name", few(MODELS, "all at once", "touching"))
-@settings(max_examples=6)
+@settings(max_examples=at_night(6, fast=3))
 @given(
     seed=st.integers(0, 2**31),
     threads=st.sampled_from([1, 2, None]),
@@ -93,7 +93,7 @@ def test_threads_change_no_bit(name, integrator):
     ("integrator", "kinematics"), [("gym", "euler"), ("mujoco", "semi-implicit")]
 )
 @given(seed=st.integers(0, 2**31), n=st.integers(1, 12))
-@settings(max_examples=8)
+@settings(max_examples=at_night(8, fast=3))
 def test_equal_to_gymnasiums_vector(sutton_barto, integrator, kinematics, seed, n):
     arguments = {"num_envs": n, "max_episode_steps": 30, "sutton_barto_reward": sutton_barto}
     envs = gymnasium.make_vec(ENV_ID, integrator=integrator, **arguments)

@@ -24,7 +24,7 @@ from mjcartpole.learning.evaluation import evaluate
 from mjcartpole.learning.methods import METHODS
 from mjcartpole.learning.training import train
 from mjcartpole.physics.load import load_model
-from nightly import examples, few
+from nightly import at_night, examples, few
 
 RUBBING = ('damping="0" frictionloss="0"', 'damping="0.2" frictionloss="0.05"')
 
@@ -104,7 +104,8 @@ def configs(draw):
         episodes=draw(st.integers(1, 40)),
         seed=draw(st.integers(0, 9) | st.integers(0, 2**70)),
         bins=draw(st.tuples(*[st.sampled_from([1, 1, 2, 3, 8]) | st.integers(1, 14)] * 4)),
-        tilings=draw(st.sampled_from([1, 1, 1, 2, 8])),
+        # For each number of axes tiles are compiled anew.
+        tilings=draw(st.sampled_from(at_night([1, 1, 1, 2, 8], fast=[1]))),
         low=tuple(-each for each in width) if mirror else low,
         high=width if mirror else high,
         mirror=mirror,
@@ -155,6 +156,11 @@ def test_the_presets_give_the_same_bits(preset, backend, changes):
 def test_every_method_gives_the_same_bits(method, backend):
     config = TrainConfig.preset("tuned", method=method, backend=backend, episodes=60, seed=2)
     assert_engines_agree(dataclasses.replace(config, ties="random"))
+
+
+@pytest.mark.parametrize("backend", few(["mujoco", "gym"], "gym"))
+def test_tiles_give_the_same_bits(backend):
+    assert_engines_agree(TrainConfig(backend=backend, tilings=4, ties="random", episodes=30))
 
 
 @pytest.mark.parametrize("integrator", ["gym", "mujoco"])
@@ -220,7 +226,7 @@ def test_evaluations_are_the_same_episodes(backend, seed):
     policies = [
         random_policy(seed),
         random_policy(seed, bins=(1, 1, 1, 1)),
-        train(TrainConfig(backend=backend, seed=seed)).policy,
+        train(TrainConfig(backend=backend, seed=seed, episodes=at_night(1500, fast=400))).policy,
         train(TrainConfig(backend=backend, seed=seed, episodes=150)).policy,
     ]
     for policy in policies:
