@@ -82,7 +82,7 @@ ENDLESS = {
 """What a reader ends by Ctrl-C, and the file or the words that come first."""
 
 PRINTED = {
-    "tuned on mujoco: 1,500 episodes, seed 0": "make train",
+    "tuned on mujoco: 1,000 episodes, seed 0": "make train",
     "greedy evaluation on mujoco, runs/tuned-mujoco-seed0/model.xml with hinge.damping=0.2: "
     "100 episodes, seed 1000000": (
         "mjcartpole evaluate runs/tuned-mujoco-seed0 --set hinge.damping=0.2"

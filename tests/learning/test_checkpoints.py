@@ -25,7 +25,7 @@ from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.training import Training
 from nightly import examples, few
 
-CONFIG = TrainConfig(backend="gym", episodes=12, seed=5)
+CONFIG = TrainConfig(mirror=False, backend="gym", episodes=12, seed=5)
 DOCUMENT = "<mujoco/>"
 HEAD = b"mjcartpole checkpoint 1 "
 
@@ -142,7 +142,7 @@ def test_a_checkpoint_of_a_config_without_what_came_later_is_read(content, scrat
     """Version 0.1 wrote such, with a table of two columns."""
     archive = dict(np.load(io.BytesIO(content[len(HEAD) + 65 :])))
     about = json.loads(archive["about"].tobytes())
-    for name in ("task", "method", "mirror", "evaluate_every", "until"):
+    for name in ("task", "method", "mirror", "tilings", "evaluate_every", "until"):
         del about["config"][name]
     archive["about"] = np.frombuffer(json.dumps(about).encode(), np.uint8)
     archive["q_table"] = archive["q_table"].reshape(-1, 2)

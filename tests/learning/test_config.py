@@ -96,7 +96,7 @@ def test_values_that_make_no_sense(changes, message):
     ("changes", "period", "solved_at"),
     [
         ({}, None, 475),
-        ({"until": 300}, 15, 300),
+        ({"until": 300}, 10, 300),
         ({"until": 300, "episodes": 60}, 1, 300),
         ({"until": 500, "evaluate_every": 7}, 7, 500),
         ({"evaluate_every": 2_000}, 2_000, 475),

@@ -91,7 +91,7 @@ def test_a_mirror_image_has_the_same_row_and_the_other_hand(bins, values):
         np.isclose(value, edge, atol=1e-9).any() for value, edge in zip(values, edges, strict=True)
     )
     row, flipped = mirrored.folded(values)
-    assert 0 <= row < mirrored.n_rows
+    assert 0 <= 2 * row < mirrored.n_rows
     if not on_edges:
         other, other_flipped = mirrored.folded([-value for value in values])
         in_the_middle = mirrored(values) == mirrored([-value for value in values])
@@ -105,6 +105,7 @@ def test_a_mirror_image_has_the_same_row_and_the_other_hand(bins, values):
 def test_what_half_a_table_says_of_the_whole(bins):
     discretizer = Discretizer(bins, (-1.0, -1.0), (1.0, 1.0), mirror=True)
     learned = np.arange(2.0 * discretizer.n_rows).reshape(-1, 2)
+    learned[(discretizer.n_rows + 1) // 2 :] = np.nan
     table = discretizer.unfolded(learned)
     assert table.shape == (discretizer.n_states, 2)
     for values in np.random.default_rng(0).uniform(-1, 1, (50, 2)).tolist():
@@ -114,7 +115,7 @@ def test_what_half_a_table_says_of_the_whole(bins):
 
 
 def test_a_grid_that_is_not_symmetric_has_no_mirror():
-    assert Discretizer((2, 1), (-1.0, -1.0), (1.0, 3.0), mirror=True).n_rows == 1
+    assert Discretizer((2, 1), (-1.0, -1.0), (1.0, 3.0), mirror=True).n_rows == 2
     with pytest.raises(ConfigError, match=r"as long to the left as to the right; -1.0 to 3.0"):
         Discretizer((2, 2), (-1.0, -1.0), (1.0, 3.0), mirror=True)
 

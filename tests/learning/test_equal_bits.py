@@ -272,7 +272,7 @@ def test_diverging_physics_stop_evaluations_at_the_same_step(name):
     for engine in ENGINES:
         with pytest.raises(SimulationError, match=r"^episode \d+, step \d+: .* diverged") as error:
             evaluate(
-                train(TrainConfig(episodes=200, seed=3)).policy,
+                train(TrainConfig(episodes=200, seed=3, mirror=False, decay=0.5)).policy,
                 model=load_model(DIVERGING[name]),
                 engine=engine,
             )

@@ -9,30 +9,39 @@ from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.training import train
 from nightly import few
 
+FORMER = {"episodes": 1_500, "decay": 0.5, "mirror": False}
+"""What `tuned` was in 0.1.0."""
+
 PRESETS = [
     (
-        TrainConfig.preset("tuned"),
+        TrainConfig.preset("tuned", **FORMER),
         "0a14bbeac28b724056643ef89e6dfe5f170b35340ae1918f57b19c49b7ed0aa8",
         "86d6c26c98ea4397fa2452431bcdff5a4c377bcdafecc2a8a48ff9d5db96b7fd",
     ),
     (
-        TrainConfig.preset("tuned", backend="gym"),
+        TrainConfig.preset("tuned", backend="gym", **FORMER),
         "0e608f16050e0a6ea3f7eccd3ccc8d8773460bc5dc0fc45d18967d95d2572d7b",
         "e0453f81252f8838894e96c17fca3bf6565837930f7db46bea4bb743da2b0dc4",
     ),
     (
-        TrainConfig.preset("tuned", integrator="mujoco", seed=7),
+        TrainConfig.preset("tuned", integrator="mujoco", seed=7, **FORMER),
         "20a1089585f282b6d56cf6b424cedb7c9455395c493e16cc6131cbc078e4b881",
         "fb1e1738f2b804879a922473f2d2b102c7a75ef072446b0e7882825370e95cef",
     ),
     (
-        TrainConfig.preset("tuned", td_lambda=None, seed=3, ties="random"),
+        TrainConfig.preset("tuned", td_lambda=None, seed=3, ties="random", **FORMER),
         "bb4e7e8850167ed80cf9e3d7af77c636a1257d09ed59f72607bbe663c0bd191a",
         "1d4c6c0a4cb513efd7f04cd822112a3dd075f26d0f1ca28ad57d5641a34ae01c",
     ),
     (
         TrainConfig.preset(
-            "tuned", backend="gym", td_lambda=None, seed=3, ties="random", learn_last_step=False
+            "tuned",
+            backend="gym",
+            td_lambda=None,
+            seed=3,
+            ties="random",
+            learn_last_step=False,
+            **FORMER,
         ),
         "c8f08b4653272a7be4815a23bc5bcb0678dcca4f7a5376c909924fff3d53416e",
         "ba352596ba442501e463af4a207b6e56acd34369ebd003672606b90ed0155acd",

@@ -213,7 +213,7 @@ def test_what_is_not_symmetric_has_no_mirror(engine):
 
 
 def test_an_environment_of_ones_own_is_trained_on():
-    config = TrainConfig(backend="gym", episodes=15, seed=3)
+    config = TrainConfig(backend="gym", episodes=15, seed=3, mirror=False)
     env = gymnasium.make("CartPole-v1")
     own = Training(config, env)
     assert own.engine == "python"

@@ -10,7 +10,13 @@ from tyro.constructors import ConstructorRegistry, PrimitiveConstructorSpec, Pri
 from mjcartpole.commands.options import UsageError
 
 LISTS = ConstructorRegistry()
-"""How tyro reads a flag that takes several numbers or names: with commas between them too."""
+"""How tyro reads a flag that takes several numbers or names: with commas between them too. And one
+that is yes, no, or left to what is found: as a flag alone, with --no- before it, or with a word."""
+
+_YES_OR_NO: Final = {"yes": True, "no": False}
+_SAID: Final = {None: "where all is alike", True: "yes", False: "no"}
+
+_SHORT: Final = {"--no-mirror": ("--mirror", "no")}
 
 _DASHED_FILE = re.compile(r"-(?!-|o=).+\.(mp4|gif|webp|png|xml|json)")
 """A file whose name begins with a dash: no flag with a single one looks like this."""
@@ -18,6 +24,7 @@ _DASHED_FILE = re.compile(r"-(?!-|o=).+\.(mp4|gif|webp|png|xml|json)")
 
 def rewritten(words: Sequence[str]) -> list[str]:
     """Return the words with all edits after one `--set`, wherever and however often they stood."""
+    words = [part for word in words for part in _SHORT.get(word, (word,))]
     words = [f"./{word}" if _DASHED_FILE.fullmatch(word) else word for word in words]
     others, edits, follows, first = [], list[str](), False, False
     for word in words:
@@ -61,6 +68,25 @@ def _list_rule(info: PrimitiveTypeInfo) -> PrimitiveConstructorSpec[Any] | None:
         is_instance=lambda value: isinstance(value, tuple),
         str_from_instance=lambda values: list(map(str, values)),
     )
+
+
+@LISTS.primitive_rule
+def _yes_or_no_rule(info: PrimitiveTypeInfo) -> PrimitiveConstructorSpec[Any] | None:
+    if info.type != (bool | None):
+        return None
+    return PrimitiveConstructorSpec(
+        nargs=(0, 1),
+        metavar="[{yes,no}]",
+        instance_from_str=lambda words: _read_yes_or_no(*words),
+        is_instance=lambda value: value is None or isinstance(value, bool),
+        str_from_instance=lambda value: [_SAID[value]],
+    )
+
+
+def _read_yes_or_no(word: str = "yes") -> bool:
+    if word not in _YES_OR_NO:
+        raise ValueError(f"'{word}' is neither yes nor no")
+    return _YES_OR_NO[word]
 
 
 def _read(kind: Any, text: str) -> Any:  # noqa: ANN401 - one of three

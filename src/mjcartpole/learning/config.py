@@ -55,8 +55,10 @@ _ARTICLE: dict[str, Any] = {
     "q_init_low": 0.0,
     "q_init_high": 1.0,
     "ties": "first",
+    "decay": 0.5,
     "td_lambda": None,
     "learn_last_step": False,
+    "mirror": False,
     "log_every": 2_000,
 }
 # Finer for the long pole, which turns slowly; where the cart is counts, how fast it moves does not.
@@ -72,6 +74,7 @@ _TWO_POLES: dict[str, Any] = {
     "q_init_low": 100.0,
     "q_init_high": 100.0,
     "td_lambda": 0.95,
+    "mirror": False,
     "log_every": 3_000,
 }
 PRESETS: Final[dict[str, dict[str, Any]]] = {
@@ -113,7 +116,7 @@ class TrainConfig:
     """The rules: limits, starting states, reward, time limit."""
     method: str = DEFAULT_METHOD
     """How the table learns; each method has parameters of its own."""
-    episodes: int = 1_500
+    episodes: int = 1_000
     """Episodes to train."""
     seed: int = 0
     """Seeds the environment and the learner."""
@@ -124,9 +127,10 @@ class TrainConfig:
     """Lower ends of the bins' ranges; what lies outside belongs to the edge bins."""
     high: tuple[float, ...] = (2.4, 0.75, 0.2095, 1.5)
     """Upper ends of the bins' ranges."""
-    mirror: bool = False
-    """Learn of each state and action what their mirror images teach: left and right are alike."""
-    log_every: int = 150
+    mirror: bool | None = None
+    """Learn of each state and action what their mirror images teach: left and right are alike. Left
+    out: where model, rules and grid are so."""
+    log_every: int = 100
     """Episodes per row of the printed table."""
     evaluate_every: int | None = None
     """Play greedy episodes after each so many of training, for evaluations.csv and the printed
@@ -247,7 +251,7 @@ class TrainConfig:
                     f"give {_DIMENSIONS}{also} ({', '.join(state_names(poles))})"
                 )
         bins, low, high = (_for_each_pole(getattr(self, name), poles) for name in _GRID)
-        return Discretizer(bins, low, high, self.mirror, self.values().get("tilings", 1))
+        return Discretizer(bins, low, high, bool(self.mirror), self.values().get("tilings", 1))
 
     @property
     def evaluation_period(self) -> int | None:

@@ -109,10 +109,8 @@ class Discretizer:
 
     @property
     def n_rows(self) -> int:
-        """Number of rows of a learner's table: of a mirrored grid half, and the middle one."""
-        if self.tilings > 1:
-            return self.tilings * math.prod(self.bins)
-        return -(-self.n_states // 2) if self.mirror else self.n_states
+        """Number of rows of a table; of a mirrored grid a learner leaves the second half alone."""
+        return self.tilings * math.prod(self.bins)
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -132,13 +130,13 @@ class Discretizer:
         return folded(row_of(values, self.grid), self.grid.folding)
 
     def unfolded(self, learned: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-        """Return the values of both actions in all rows of one grid, from those learned.
+        """Return the values of both actions in all rows of one mirrored grid.
 
         Args:
-            learned: Shape (n_rows, 2).
+            learned: Shape (n_rows, 2); what is in the second half does not count.
         """
-        images = learned[: self.n_states - self.n_rows]
-        return np.concatenate([learned, images[::-1, ::-1]])
+        half = self.n_rows // 2
+        return np.concatenate([learned[: self.n_rows - half], learned[:half][::-1, ::-1]])
 
     def _check(self) -> None:
         if not len(self.bins) == len(self.low) == len(self.high):

@@ -83,7 +83,7 @@ class Policy:
         A mirrored grid is written out; of several tilings the fold stays, for they are no mirror
         images of each other.
         """
-        if discretizer.tilings == 1:
+        if discretizer.mirror and discretizer.tilings == 1:
             values = discretizer.unfolded(values)
             discretizer = dataclasses.replace(discretizer, mirror=False)
         return cls(discretizer, values.reshape(*discretizer.shape, N_ACTIONS).copy())

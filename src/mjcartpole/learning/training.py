@@ -1,5 +1,6 @@
 """From a `TrainConfig` to a `TrainResult`."""
 
+import dataclasses
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -13,6 +14,7 @@ from gymnasium.utils import seeding
 from mjcartpole.envs.backend import make_env
 from mjcartpole.errors import ConfigError, SimulationError
 from mjcartpole.learning.config import TrainConfig
+from mjcartpole.learning.discretizer import Discretizer
 from mjcartpole.learning.engine import Engine, check_engine, choose_engine
 from mjcartpole.learning.episodes import Columns, EpisodeLog
 from mjcartpole.learning.evaluation import evaluate_where_trained
@@ -131,9 +133,7 @@ class Training:
             cartpole = None
         elif cartpole is None and env is None:
             cartpole = config.load_model()
-        self.discretizer = config.discretizer(_count_poles(cartpole, env))
-        if config.mirror:
-            check_symmetric(cartpole, config.integrator, task=config.rules)
+        self.discretizer = _discretizer(config, cartpole, env)
         self.learner = Learner(config, self.discretizer)
         self.log = EpisodeLog(config.episodes)
         self.evaluations: tuple[GreedyPoint, ...] = ()
@@ -271,6 +271,22 @@ def train(config: TrainConfig | None = None, *, engine: Engine = "compiled") -> 
     for _ in training.run():
         pass
     return training.result()
+
+
+def _discretizer(
+    config: TrainConfig, cartpole: CartPole | None, env: gymnasium.Env[Any, Any] | None
+) -> Discretizer:
+    """Return the grid, mirrored if that is asked for, or left open where all is symmetric."""
+    grid = config.discretizer(_count_poles(cartpole, env))
+    if config.mirror is False or (config.mirror is None and env is not None):
+        return grid
+    try:
+        check_symmetric(cartpole, config.integrator, task=config.rules)
+        return dataclasses.replace(grid, mirror=True)
+    except (ConfigError, SimulationError):
+        if config.mirror:
+            raise
+        return grid
 
 
 def _count_poles(cartpole: CartPole | None, env: gymnasium.Env[Any, Any] | None) -> int:

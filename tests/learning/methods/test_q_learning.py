@@ -31,7 +31,7 @@ def test_the_last_step_can_be_left_out(at_work):
 
 
 def test_schedules_follow_the_episode(at_work):
-    q = at_work([[0.0, 0.0]], alpha=0.5, epsilon=1.0)
+    q = at_work([[0.0, 0.0]], alpha=0.5, epsilon=1.0, decay=0.5)
     for number, rates in ((0, (0.5, 1.0)), (5, (0.25, 0.5)), (50, (0.0, 0.0))):
         q.begin(number)
         assert q.rates == rates

@@ -45,7 +45,7 @@ class ActionValueParameters(Parameters):
     """Probability of a random action at the start."""
     epsilon_final: float = 0.01
     """Probability of a random action once decayed."""
-    decay: float = 0.5
+    decay: float = 0.8
     """Share of the episodes over which alpha and epsilon fall, linearly."""
     q_init_low: float = 10.0
     """The table starts uniformly random between this …"""
