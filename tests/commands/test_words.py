@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 import tyro
 
+from mjcartpole.cli import parse
 from mjcartpole.commands.options import UsageError
 from mjcartpole.commands.words import LISTS, rewritten, value_of
 
@@ -66,3 +67,23 @@ def test_a_file_whose_name_has_a_comma_is_one_value(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("a,b.xml").write_text("")
     assert parsed("--models a,b.xml c,d").models == ("a,b.xml", "c", "d")
+
+
+@pytest.mark.parametrize(
+    ("words", "mirror"),
+    [
+        ([], None),
+        (["--mirror"], True),
+        (["--mirror", "--seed", "3"], True),
+        (["--seed", "3", "--mirror", "yes"], True),
+        (["--mirror", "no"], False),
+        (["--no-mirror", "--seed", "3"], False),
+    ],
+)
+def test_a_flag_that_is_yes_no_or_left_to_what_is_found(words, mirror):
+    assert parse(["train", *words]).config.mirror is mirror
+
+
+def test_what_is_neither_yes_nor_no():
+    with pytest.raises(UsageError, match="--mirror: 'maybe' is neither yes nor no"):
+        parse(["train", "--mirror", "maybe"])

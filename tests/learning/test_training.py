@@ -209,7 +209,10 @@ def test_a_mirrored_step_is_learned_for_its_image():
 def test_what_is_not_symmetric_has_no_mirror(engine):
     with pytest.raises(ConfigError, match="wind does not: pushed to the right from upright rest"):
         Training(TrainConfig(model="wind", mirror=True), engine=engine)
-    assert Training(TrainConfig(backend="gym", mirror=True), engine=engine).learner.p.gamma == 0.98
+    assert not Training(TrainConfig(model="wind"), engine=engine).discretizer.mirror
+    assert not Training(TrainConfig(low=(-2, -1, -0.1, -1)), engine=engine).discretizer.mirror
+    for backend in ("mujoco", "gym"):
+        assert Training(TrainConfig(backend=backend), engine=engine).discretizer.mirror
 
 
 def test_an_environment_of_ones_own_is_trained_on():
