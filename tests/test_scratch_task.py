@@ -52,7 +52,7 @@ def config(backend: str, **changes) -> TrainConfig:
     return TrainConfig(backend=backend, task=NARROW.name, episodes=200, seed=1, **changes)
 
 
-@pytest.mark.parametrize("backend", BACKENDS)
+@pytest.mark.parametrize("backend", few(BACKENDS, "mujoco"))
 def test_both_engines_learn_it_alike(backend):
     compiled, plain = (train(config(backend), engine=e) for e in ("compiled", "python"))
     np.testing.assert_array_equal(compiled.q_table, plain.q_table)
@@ -145,7 +145,7 @@ def run(*words: str) -> int:
     return ended.value.code
 
 
-@pytest.mark.parametrize("backend", few(BACKENDS, "gym"))
+@pytest.mark.parametrize("backend", few(BACKENDS, "mujoco"))
 def test_the_command_line_trains_films_and_evaluates_it(backend, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     words = ["train", "--backend", backend, "--task", NARROW.name, "--episodes", "100"]

@@ -28,7 +28,7 @@ from mjcartpole.learning.methods import METHODS, action_values, n_step_sarsa, sa
 from mjcartpole.learning.methods.experience import Trajectory, Transition
 from mjcartpole.learning.stepping import compiled
 from mjcartpole.task import minus_one_at_the_end, one_per_step
-from nightly import examples
+from nightly import examples, few
 
 quick = examples(200)
 
@@ -99,7 +99,8 @@ def both(name):
     return loop, numba.njit(error_model="numpy")(loop)
 
 
-@pytest.mark.parametrize("name", METHODS)
+# The other methods are compiled in test_equal_bits.py.
+@pytest.mark.parametrize("name", few(METHODS, "sarsa", "expected-sarsa"))
 @given(tables, rates, rates, rates, rates, rows, st.booleans(), st.booleans(), st.booleans())
 @quick
 def test_every_method_learns_the_same_compiled(

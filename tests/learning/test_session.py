@@ -5,6 +5,7 @@ import itertools
 import pytest
 
 from mjcartpole.errors import ConfigError, FileError, SimulationError
+from mjcartpole.learning import compiled
 from mjcartpole.learning.checkpoints import LATEST, load_checkpoint
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.session import Session, check_interval
@@ -68,11 +69,12 @@ def test_it_saves_when_it_is_stopped(tmp_path):
     ("first", "then"),
     few(itertools.product(["compiled", "python"], repeat=2), ("compiled", "python")),
 )
-def test_a_stopped_session_goes_on_to_the_same_end(first, then, tmp_path):
-    config = TrainConfig(episodes=400, seed=2, ties="random")
+def test_a_stopped_session_goes_on_to_the_same_end(first, then, tmp_path, monkeypatch):
+    monkeypatch.setattr(compiled, "CHUNK_STEPS", 500)
+    config = TrainConfig(episodes=100, seed=2, ties="random")
     session = session_in(tmp_path, config=config, engine=first)
-    for finished in session.run(lambda: len(session.training.log) >= 50):
-        assert finished < 400
+    for finished in session.run(lambda: len(session.training.log) >= 30):
+        assert finished < 100
     again = session_in(tmp_path, config=config, engine=then)
     again.resume(saved(tmp_path, config=config))
     assert len(again.training.log) == len(session.training.log)

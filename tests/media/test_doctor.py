@@ -91,10 +91,11 @@ def test_no_opengl_at_all(hide):
     ("wish", "said"),
     [
         ("osmesa", "osmesa (does not work here: libOSMesa.so.8"),
-        pytest.param("garbage", "garbage (names no OpenGL backend", marks=pytest.mark.slow),
-        pytest.param("glfw", "glfw (does not work here: neither DISPLAY", marks=pytest.mark.slow),
+        ("garbage", "garbage (names no OpenGL backend"),
+        ("glfw", "glfw (does not work here: neither DISPLAY"),
     ],
 )
+@pytest.mark.slow
 def test_a_misleading_wish(hide, wish, said):
     needs("egl")
     report = examine_with(MUJOCO_GL=wish, **hide("osmesa"))
