@@ -141,7 +141,6 @@ def test_importing_the_package_is_light():
     "words",
     few(
         [[], *([registry.name_of(command)] for command in registry.COMMANDS)],
-        [],
         ["train"],
     ),
     ids=str,

@@ -37,8 +37,6 @@ PATIENCE = 900
 FAST = {
     "README.md": {
         "make train",
-        "mjcartpole model edit cartpole --set pole.mass=0.3 -o heavy.xml",
-        "mjcartpole evaluate runs/tuned-mujoco-seed0 --model heavy.xml",
         "import gymnasium",
     },
     "docs/performance.md": {"mjcartpole --help"},

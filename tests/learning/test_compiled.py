@@ -19,7 +19,7 @@ from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.evaluation import evaluate
 from mjcartpole.learning.training import Training, train
 from mjcartpole.physics.load import load_model
-from nightly import few
+from nightly import at_night, few
 
 
 @pytest.mark.parametrize("chunk", few([1, 7, 1_000, 10**9], 7))
@@ -114,7 +114,8 @@ def test_an_interpreter_runs_on_while_a_chunk_is_computed(monkeypatch):
 
 @pytest.mark.parametrize("backend", ["mujoco", "gym"])
 def test_trainings_in_threads_are_those_done_one_after_another(backend):
-    wanted = [TrainConfig(backend=backend, seed=seed, episodes=300) for seed in range(4)]
+    episodes = at_night(300, fast=80)
+    wanted = [TrainConfig(backend=backend, seed=seed, episodes=episodes) for seed in range(4)]
     expected = [outcome(config, "compiled") for config in wanted]
     with ThreadPoolExecutor(4) as threads:
         found = list(threads.map(lambda config: outcome(config, "compiled"), wanted))

@@ -118,6 +118,7 @@ def test_an_engine_cannot_be_asked_of_an_environment_that_is_given():
     assert Training(TrainConfig(episodes=2), make_env("gym")).engine == "python"
 
 
+@pytest.mark.slow
 def test_where_numba_compiles_nothing_the_reference_loop_does_the_same():
     found, said = trained_elsewhere(NUMBA_DISABLE_JIT="1")
     assert found == trained_here()

@@ -8,6 +8,7 @@ import pytest
 
 from mjcartpole.errors import RunError
 from mjcartpole.learning.folders import LOCK, held_folder, locked_folder
+from nightly import at_night
 
 
 def race(folder, work, processes=4, rounds=300):
@@ -47,7 +48,7 @@ def hold(folder):
 
 
 def test_racing_trainings_hold_a_folder_one_after_the_other(tmp_path):
-    counts = race(tmp_path / "deep" / "run", hold)
+    counts = race(tmp_path / "deep" / "run", hold, rounds=at_night(300, fast=60))
     assert min(counts) >= 0
     assert sum(counts) > 0
     assert list((tmp_path / "deep").iterdir()) == []

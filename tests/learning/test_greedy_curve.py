@@ -37,7 +37,7 @@ EACH = list(itertools.product(METHODS, ["gym", "mujoco"], ENGINES))
 
 @pytest.mark.parametrize(
     ("method", "backend", "engine"),
-    few(EACH, ("q-learning", "gym", "python"), ("sarsa", "mujoco", "compiled")),
+    few(EACH, ("q-learning", "gym", "python"), ("q-learning", "mujoco", "compiled")),
 )
 def test_evaluations_change_no_bit_of_what_is_learned(method, backend, engine, monkeypatch):
     monkeypatch.setattr(compiled, "CHUNK_STEPS", 100)

@@ -104,6 +104,7 @@ def test_a_misleading_wish(hide, wish, said):
     assert states(report) == {"egl": True, "osmesa": False, "glfw": False, "sketch": True}
 
 
+@pytest.mark.slow
 def test_opengl_switched_off():
     report = examine_with(MUJOCO_GL="disable")
     assert report["renderer"] == "sketch"

@@ -158,7 +158,8 @@ FORGETFUL = """
 """
 
 
-@pytest.mark.parametrize("wish", few(["egl", "osmesa"], "egl"))
+@pytest.mark.slow
+@pytest.mark.parametrize("wish", ["egl", "osmesa"])
 def test_renderers_nobody_closes_end_in_silence(wish):
     if not gl.works(wish):
         pytest.skip(f"no OpenGL by {wish} here")

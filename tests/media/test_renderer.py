@@ -325,7 +325,7 @@ with open_renderer(load_model(), kind=kind) as renderer:
     assert renderer.kind == kind
     numpy.save(path, [renderer.render(state) for state in numpy.load(states)])
 """
-    states = random_states(at_night(8, fast=3), seed=8)
+    states = random_states(at_night(8, fast=2), seed=8)
     np.save(tmp_path / "states.npy", states)
     with open_renderer(cartpole, kind="sketch") as sketch:
         frames = {"sketch": np.array([sketch.render(state) for state in states], float)}

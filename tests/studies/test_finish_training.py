@@ -14,7 +14,7 @@ from mjcartpole.physics.load import load_model
 from mjcartpole.studies.finish_training import evaluate_where_trained, finish_training
 from nightly import few
 
-CONFIG = TrainConfig(episodes=20, seed=6)
+CONFIG = TrainConfig(episodes=20, seed=1)
 CARTPOLE = load_model()
 
 
@@ -46,7 +46,7 @@ def test_a_training_that_is_over_is_written_and_evaluated(engine, tmp_path):
         "preset": "tuned",
         "backend": "mujoco",
         "model": "cartpole",
-        "seed": 6,
+        "seed": 1,
         "episodes": 20,
         "interrupted": False,
         "steps": alone.steps,

@@ -36,7 +36,7 @@ def assert_as_alone(many, config):
         assert found.score == played.returns.mean()
 
 
-@pytest.mark.parametrize("workers", [1, 2, 5, None])
+@pytest.mark.parametrize("workers", few([1, 2, 5, None], 2, None))
 @pytest.mark.parametrize(
     "config",
     [CONFIG, TrainConfig(episodes=15, integrator="mujoco", ties="random", td_lambda=None)],
