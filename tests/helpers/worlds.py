@@ -1,5 +1,7 @@
 """Small worlds whose values are known, for methods to learn."""
 
+import numpy as np
+
 
 class Walk:
     """A row of states between two ends; action 1 goes right, 0 left.
@@ -33,3 +35,27 @@ class Lure:
         if s == 1:
             return rng.normal(-0.1, 1.0), 1, True
         return 0.0, 1, a == 1
+
+
+class Slippery:
+    """A row of states with a wall on the left and a way out on the right; feet slip.
+
+    One goes where one wants four of five times, else the other way. A step gives the place that it
+    begins at.
+    """
+
+    start = 0
+
+    def __init__(self, n):
+        self.n = n
+        self.rewards = np.repeat(np.arange(float(n)), 2).reshape(n, 2)
+        self.leads = np.zeros((n, 2, n))
+        """Probability of each next state; what is missing is that of the way out."""
+        for s, a, aside in np.ndindex(n, 2, 2):
+            s_next = max(s + 2 * (a ^ aside) - 1, 0)
+            if s_next < n:
+                self.leads[s, a, s_next] += 0.2 if aside else 0.8
+
+    def step(self, s, a, rng):
+        s_next = max(s + (2 * a - 1) * (1 if rng.random() < 0.8 else -1), 0)
+        return float(s), min(s_next, self.n - 1), s_next == self.n

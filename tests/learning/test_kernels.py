@@ -21,7 +21,7 @@ from mjcartpole import task
 from mjcartpole.learning import compiled as compiled_engine
 from mjcartpole.learning import discretizer, episodes, kernels, schedules, stepping
 from mjcartpole.learning.compiled import _arrays
-from mjcartpole.learning.config import TrainConfig
+from mjcartpole.learning.config import TrainConfig, config_class
 from mjcartpole.learning.discretizer import Discretizer
 from mjcartpole.learning.learner import Learner
 from mjcartpole.learning.methods import METHODS, action_values, n_step_sarsa, sarsa
@@ -107,9 +107,9 @@ def test_every_method_learns_the_same_compiled(
     name, table, alpha, epsilon, gamma, lam, visited, terminated, last, ties
 ):
     values = {"alpha": alpha, "epsilon": epsilon, "gamma": gamma, "learn_last_step": last}
-    if name == "q-learning":
-        values["td_lambda"] = lam if lam != 0.1 else None
-    values["ties"] = "random" if ties else "first"
+    values |= {"td_lambda": lam if lam != 0.1 else None, "ties": "random" if ties else "first"}
+    known = config_class(name).fields()
+    values = {each: values[each] for each in values if each in known}
     found = []
     for function in both(name):
         learner = Learner(TrainConfig(method=name, **values), FOUR_STATES)
@@ -220,7 +220,7 @@ def test_rewards_that_do_not_compile(reward, why):
 REWARDS = """
     import mjcartpole
     from mjcartpole.learning import kernels
-    from mjcartpole.learning.config import TrainConfig
+    from mjcartpole.learning.config import TrainConfig, config_class
     from mjcartpole.learning.methods import q_learning
     from mjcartpole.task import one_per_step
     from mjcartpole.learning.training import train

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mjcartpole.learning.config import TrainConfig
+from mjcartpole.learning.config import DEFAULT_METHOD, TrainConfig, config_class
 from mjcartpole.learning.discretizer import Discretizer
 from mjcartpole.learning.learner import Learner
 from mjcartpole.learning.methods.experience import Trajectory, Transition
@@ -13,7 +13,9 @@ class AtWork(Learner):
     """A learner whose functions are called with what they need."""
 
     def __init__(self, table, **values):
-        config = TrainConfig(**{"alpha_final": 0.0, "epsilon_final": 0.0, "episodes": 20} | values)
+        usual = {"alpha_final": 0.0, "epsilon_final": 0.0, "episodes": 20}
+        known = config_class(values.get("method", DEFAULT_METHOD)).fields()
+        config = TrainConfig(**{name: usual[name] for name in usual if name in known} | values)
         super().__init__(config, Discretizer((len(table),), (-1.0,), (1.0,)))
         self.q = self.memory.q_table
         self.q[:] = np.ravel(table)

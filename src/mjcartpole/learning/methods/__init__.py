@@ -14,6 +14,7 @@ from mjcartpole.errors import check_known
 from mjcartpole.learning.methods import (
     double_q,
     expected_sarsa,
+    model,
     n_step_sarsa,
     q_learning,
     sarsa,
@@ -63,6 +64,7 @@ METHODS: Final[dict[str, Any]] = {
     "expected-sarsa": expected_sarsa,
     "n-step-sarsa": n_step_sarsa,
     "double-q": double_q,
+    "model": model,
 }
 """Every method by its name; each value is a `Method`."""
 

@@ -32,21 +32,50 @@ class Rates(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True)
-class ActionValueParameters(Parameters):
-    """Discount, step size, exploration and the first table."""
+class DiscountParameters(Parameters):
+    """What the future is worth."""
 
     gamma: float = 0.98
     """Discount per step."""
+
+    def check_parameters(self) -> None:
+        """Refuse values that make no sense.
+
+        Raises:
+            ConfigError: See above.
+        """
+        self._check_shares("gamma")
+
+
+@dataclass(frozen=True, kw_only=True)
+class StepSizeParameters(DiscountParameters):
+    """How far a value moves towards its target."""
+
     alpha: float = 0.1
     """Step size at the start."""
     alpha_final: float = 0.01
     """Step size once decayed."""
+
+    def check_parameters(self) -> None:
+        """Refuse values that make no sense.
+
+        Raises:
+            ConfigError: See above.
+        """
+        super().check_parameters()
+        self._check_shares("alpha", "alpha_final")
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExplorationParameters(DiscountParameters):
+    """Exploration and the first table."""
+
     epsilon: float = 1.0
     """Probability of a random action at the start."""
     epsilon_final: float = 0.01
     """Probability of a random action once decayed."""
     decay: float = 0.8
-    """Share of the episodes over which alpha and epsilon fall, linearly."""
+    """Share of the episodes over which what decays falls, linearly."""
     q_init_low: float = 10.0
     """The table starts uniformly random between this …"""
     q_init_high: float = 10.0
@@ -62,7 +91,8 @@ class ActionValueParameters(Parameters):
         Raises:
             ConfigError: See above.
         """
-        self._check_shares("gamma", "alpha", "alpha_final", "epsilon", "epsilon_final", "decay")
+        super().check_parameters()
+        self._check_shares("epsilon", "epsilon_final", "decay")
         self._check_one_of("ties", ("first", "random"))
         low, high = self.q_init_low, self.q_init_high
         if not (is_finite(low) and is_finite(high) and low <= high and is_finite(high - low)):
@@ -70,6 +100,11 @@ class ActionValueParameters(Parameters):
                 "q_init_low and q_init_high must be finite, in order and not too far apart, "
                 f"not {low!r} and {high!r}"
             )
+
+
+@dataclass(frozen=True, kw_only=True)
+class ActionValueParameters(ExplorationParameters, StepSizeParameters):
+    """Discount, step size, exploration and the first table."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -103,6 +138,11 @@ def begin_episode(p: Any, memory: Any, number: int, episodes: int) -> Rates:
     slope = p.decay * episodes
     alpha = linear(p.alpha, p.alpha_final, slope, number)
     return Rates(alpha, linear(p.epsilon, p.epsilon_final, slope, number))
+
+
+def explore(p: Any, memory: Any, number: int, episodes: int) -> Rates:
+    """Return the exploration of an episode, counted from 0, of a method without a step size."""
+    return Rates(0.0, linear(p.epsilon, p.epsilon_final, p.decay * episodes, number))
 
 
 def greedy_values(memory: Any) -> npt.NDArray[np.float64]:

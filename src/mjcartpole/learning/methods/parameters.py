@@ -26,6 +26,18 @@ class Parameters:
             if not (is_finite(value) and 0 <= value <= 1):
                 raise ConfigError(f"{name} must be a number from 0 to 1, not {value!r}")
 
+    def _check_whole(self, name: str, least: int, most: int = 2**31) -> None:
+        value = getattr(self, name)
+        if type(value) is not int or not least <= value <= most:
+            raise ConfigError(
+                f"{name} must be a whole number from {least} to {most:,}, not {value!r}"
+            )
+
+    def _check_positive(self, name: str) -> None:
+        value = getattr(self, name)
+        if not (is_finite(value) and value > 0):
+            raise ConfigError(f"{name} must be a number above 0, not {value!r}")
+
     def _check_one_of(self, name: str, available: tuple[str, ...]) -> None:
         value = getattr(self, name)
         if value not in available:

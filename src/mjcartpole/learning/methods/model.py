@@ -1,0 +1,131 @@
+"""A model from counts, and value iteration in it after each episode: certainty equivalence.
+
+Sutton and Barto (2018), section 4.4, with the counted transitions of `transition_counts` as the
+world that is taken for certain:
+
+    Q(s, a)  <-  mean of r + gamma max_a' Q(s', a') over all times that a was taken in s
+
+Values of what was not seen stay as the table began: where that is more than anything is worth,
+what is unknown is tried first (Brafman and Tennenholtz, 2002, R-max). A terminated step has nothing
+after it; a truncated episode would have gone on, so its last step leads where it led.
+
+With `plan_after="failure"` a table that has just balanced stays as it is, while counting goes on
+(Robbins, 1952, doi:10.1090/S0002-9904-1952-09620-8, "win stay, lose shift").
+"""
+
+from dataclasses import dataclass
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from mjcartpole.learning.methods.action_values import (
+    ExplorationParameters,
+    FloatMemory,
+    IntMemory,
+    Rates,
+    act,
+    draw_table,
+    explore,
+)
+from mjcartpole.learning.methods.experience import Trajectory, Transition
+from mjcartpole.learning.methods.parameters import numbers_class
+from mjcartpole.learning.methods.transition_counts import (
+    CountParameters,
+    count,
+    expected_value,
+    make_counts,
+)
+from mjcartpole.learning.tiles import Table
+from mjcartpole.task import N_ACTIONS
+
+__all__ = ["act"]
+
+PlanAfter = Literal["episode", "failure"]
+"""After which episodes values are computed: each, or those that the rules ended."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Parameters(CountParameters, ExplorationParameters):
+    """Those of exploration and of counting, and how long the model is thought about."""
+
+    sweeps: int = 1_000
+    """Sweeps of value iteration after an episode, at most."""
+    tolerance: float = 0.001
+    """Sweeps end once none of the values changes by more."""
+    plan_after: PlanAfter = "episode"
+    """Compute values after each episode, or only after one that the rules ended."""
+
+    def check_parameters(self) -> None:
+        """Refuse values that make no sense.
+
+        Raises:
+            ConfigError: See above.
+        """
+        super().check_parameters()
+        self._check_whole("sweeps", 1)
+        self._check_positive("tolerance")
+        self._check_one_of("plan_after", ("episode", "failure"))
+
+
+Numbers = numbers_class(Parameters, __name__)
+begin_episode = explore
+
+
+class Memory(NamedTuple):
+    """The counts, see `Counts`, and the table of values."""
+
+    visits: IntMemory
+    rewards: FloatMemory
+    successors: IntMemory
+    counts: IntMemory
+    seen: IntMemory
+    n_seen: IntMemory
+    q_table: Table
+
+
+def make_memory(p: Any, n_rows: int, rng: np.random.Generator) -> Memory:
+    """Return a table to begin with, and counts of nothing."""
+    return Memory(*make_counts(p, n_rows), draw_table(p, n_rows, rng))
+
+
+def after_step(
+    p: Any, memory: Memory, rates: Rates, step: Transition, rng: np.random.Generator
+) -> None:
+    """Count one step."""
+    if p.learn_last_step or not step.over:
+        count(p, memory, step)
+
+
+def after_episode(
+    p: Any, memory: Memory, rates: Rates, episode: Trajectory, rng: np.random.Generator
+) -> None:
+    """Sweep until the values are those of the model."""
+    if p.plan_after == 1 and not episode.terminated:
+        return
+    for _ in range(p.sweeps):
+        if sweep(p, memory) <= p.tolerance:
+            break
+
+
+def sweep(p: Any, memory: Memory) -> float:
+    """Compute each value anew, what was seen last first; returns the largest change."""
+    q, change = memory.q_table, 0.0
+    for place in range(memory.n_seen[0] - 1, -1, -1):
+        pair = memory.seen[place]
+        value = expected_value(p, memory, pair)
+        change = max(change, abs(value - q[pair]))
+        q[pair] = value
+    return change
+
+
+def greedy_values(memory: Memory) -> npt.NDArray[np.float64]:
+    """Return the table, shape (n_rows, 2), with the first of equal values a last digit ahead.
+
+    In a model two ways may be worth the same to the last digit, and where a mirrored state is
+    played its first action is the second.
+    """
+    values = np.array(memory.q_table).reshape(-1, N_ACTIONS)
+    ties = values[:, 0] == values[:, 1]
+    values[ties, 1] = np.nextafter(values[ties, 1], -np.inf)
+    return values
