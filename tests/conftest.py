@@ -27,7 +27,7 @@ def here(tmp_path, monkeypatch):
 
 @pytest.fixture(scope="session")
 def trained(tmp_path_factory):
-    """A quick training's folder, for whoever only reads it; its pole falls after 19 steps."""
+    """A quick training's folder, for whoever only reads it; its pole falls after 26 steps."""
     folder = tmp_path_factory.mktemp("trained") / "mine"
     done(["train", *QUICK, "--seed", "8", "--run-dir", folder])
     return folder

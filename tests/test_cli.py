@@ -25,7 +25,7 @@ def test_training_leaves_a_complete_run_and_its_evaluation_repeats(run, capsys):
     assert sum(int(count) for count in re.findall(r"^  .*?(\d+)$", out, re.M)[1:]) == 100
     code, out, _ = call(["evaluate", "runs/mine", "--json"], capsys)
     assert json.loads(out).items() >= summary["evaluation"].items()
-    policy = train(TrainConfig(episodes=5, seed=8)).policy
+    policy = train(TrainConfig(episodes=3, seed=8)).policy
     assert Policy.load(run / "policy.json").q_table.tobytes() == policy.q_table.tobytes()
 
 
@@ -126,7 +126,7 @@ def test_a_file_whose_name_begins_with_a_dash_is_a_file(run, here, capsys):
 
 
 def test_training_films_its_first_evaluation_episode(here, capsys):
-    code, out, _ = call(["train", "--episodes", "5", "--run-dir", "runs/film"], capsys)
+    code, out, _ = call(["train", "--episodes", "4", "--run-dir", "runs/film"], capsys)
     assert code == 0
     assert "video  videos/film.mp4" in out
     summary = json.loads((here / "runs/film/summary.json").read_text())

@@ -17,6 +17,7 @@ from mjcartpole.envs.registration import env_id
 from mjcartpole.errors import ConfigError
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.evaluation import evaluate
+from mjcartpole.learning.policy import Policy
 from mjcartpole.learning.training import train
 from mjcartpole.studies.film import PolicySetup, play
 from mjcartpole.task import TASKS, Task
@@ -52,7 +53,8 @@ def config(backend: str, **changes) -> TrainConfig:
     return TrainConfig(backend=backend, task=NARROW.name, episodes=200, seed=1, **changes)
 
 
-@pytest.mark.parametrize("backend", few(BACKENDS, "mujoco"))
+@pytest.mark.slow
+@pytest.mark.parametrize("backend", BACKENDS)
 def test_both_engines_learn_it_alike(backend):
     compiled, plain = (train(config(backend), engine=e) for e in ("compiled", "python"))
     np.testing.assert_array_equal(compiled.q_table, plain.q_table)
@@ -61,7 +63,8 @@ def test_both_engines_learn_it_alike(backend):
     assert max(episode.steps for episode in compiled.episodes) <= NARROW.time_limit
 
 
-@pytest.mark.parametrize("backend", few(BACKENDS, "mujoco"))
+@pytest.mark.slow
+@pytest.mark.parametrize("backend", BACKENDS)
 def test_evaluation_and_film_agree(backend):
     policy = train(config(backend)).policy
     where = {"backend": backend, "task": NARROW, "episodes": 3, "seed": 5}
@@ -148,9 +151,12 @@ def run(*words: str) -> int:
 @pytest.mark.parametrize("backend", few(BACKENDS, "mujoco"))
 def test_the_command_line_trains_films_and_evaluates_it(backend, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    words = ["train", "--backend", backend, "--task", NARROW.name, "--episodes", "100"]
-    assert run(*words, "--run-dir", "run", "--log-every", "50") == 0
+    words = ["train", "--backend", backend, "--task", NARROW.name, "--episodes", "40"]
+    assert run(*words, "--run-dir", "run", "--log-every", "20") == 0
     trained = capsys.readouterr().out
+    plain = train(TrainConfig(backend=backend, task=NARROW, episodes=40), engine="python")
+    learned = Policy.load(tmp_path / "run" / "policy.json").q_table
+    np.testing.assert_array_equal(learned, plain.q_table)
     assert (tmp_path / "videos" / "run.mp4").stat().st_size > 1_000
     assert run("evaluate", "run") == 0
     figures = capsys.readouterr().out.split("greedy evaluation")[1]

@@ -111,7 +111,7 @@ def replace(path, text):
 
 
 def test_one_look(file, capsys):
-    assert Watch(file, once=1, episodes=5).run() == 0
+    assert Watch(file, once=1, episodes=4).run() == 0
     words = [line.split()[0] for line in capsys.readouterr().out.splitlines() if line]
     expected = ["sketch", "parity", "training", "greedy", "video", "done"]
     assert [word for word in words if word in expected] == expected

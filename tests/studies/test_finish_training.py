@@ -14,7 +14,7 @@ from mjcartpole.physics.load import load_model
 from mjcartpole.studies.finish_training import evaluate_where_trained, finish_training
 from nightly import few
 
-CONFIG = TrainConfig(episodes=20, seed=1)
+CONFIG = TrainConfig(episodes=20, seed=1, mirror=False)
 CARTPOLE = load_model()
 
 
@@ -75,7 +75,7 @@ def test_a_training_that_was_stopped_ends_like_one_that_was_not(stops, tmp_path)
 
 @pytest.mark.parametrize("stop", few([3, 10, 14], 10))
 def test_evaluations_of_a_stopped_training_are_those_of_one_that_was_not(stop, tmp_path):
-    config = TrainConfig(episodes=20, seed=6, backend="gym", evaluate_every=10)
+    config = TrainConfig(episodes=20, seed=1, mirror=False, backend="gym", evaluate_every=10)
     conduct(tmp_path / "whole", engine="compiled", config=config)
     conduct(tmp_path / "stopped", stop_after=stop, config=config)
     said = (tmp_path / "stopped" / runs.EVALUATIONS).read_text()
@@ -120,9 +120,9 @@ def test_results_that_a_kill_left_half_written_are_written_again(tmp_path):
 @pytest.mark.parametrize(
     "config",
     [
-        TrainConfig(episodes=9, backend="gym"),
-        TrainConfig(episodes=9, integrator="mujoco"),
-        TrainConfig(episodes=9),
+        TrainConfig(episodes=3, backend="gym"),
+        TrainConfig(episodes=3, integrator="mujoco"),
+        TrainConfig(episodes=3),
     ],
 )
 @pytest.mark.parametrize("engine", ["python", "compiled"])
