@@ -22,6 +22,11 @@ class Walk:
         """Values of both actions where each is as likely as the other, shape (n, 2)."""
         return [[(s + 2 * a) / (self.n + 1) for a in (0, 1)] for s in range(self.n)]
 
+    def values(self, right):
+        """Values of the states where action 1 has these probabilities, shape (n,)."""
+        moves = np.diag(right[:-1], 1) + np.diag(1 - right[1:], -1)
+        return np.linalg.solve(np.eye(self.n) - moves, np.eye(self.n)[-1] * right[-1])
+
 
 class Lure:
     """Left of state 0 lies state 1, in which all is noise around -0.1; right of it nothing.
@@ -59,3 +64,23 @@ class Slippery:
     def step(self, s, a, rng):
         s_next = max(s + (2 * a - 1) * (1 if rng.random() < 0.8 else -1), 0)
         return float(s), min(s_next, self.n - 1), s_next == self.n
+
+
+class Corridor:
+    """Three places that look alike, at the middle one left is right; it costs 1 a step to its end.
+
+    Sutton and Barto, example 13.1. Where action 1 has probability p, the start is worth
+    (2 p - 4) / (p (1 - p)), at most -11.66 with p = 2 - sqrt(2) = 0.586.
+    """
+
+    start = place = 0
+
+    def step(self, s, a, rng):
+        right = (a == 1) != (self.place == 1)
+        self.place = max(0, self.place + (1 if right else -1))
+        if over := self.place == 3:
+            self.place = 0
+        return -1.0, 0, over
+
+    def value(self, p):
+        return (2 * p - 4) / (p * (1 - p))

@@ -157,7 +157,9 @@ def test_the_presets_give_the_same_bits(preset, backend, changed):
 )
 def test_every_method_gives_the_same_bits(method, backend):
     config = TrainConfig.preset("tuned", method=method, backend=backend, episodes=60, seed=2)
-    assert_engines_agree(dataclasses.replace(config, ties="random"))
+    if "ties" in config.fields():
+        config = dataclasses.replace(config, ties="random")
+    assert_engines_agree(config)
 
 
 @pytest.mark.parametrize("backend", few(["mujoco", "gym"], "gym"))

@@ -108,6 +108,7 @@ def test_every_method_learns_the_same_compiled(
 ):
     values = {"alpha": alpha, "epsilon": epsilon, "gamma": gamma, "learn_last_step": last}
     values |= {"td_lambda": lam if lam != 0.1 else None, "ties": "random" if ties else "first"}
+    values |= {"trace_lambda": lam, "alpha_values": lam}
     known = config_class(name).fields()
     values = {each: values[each] for each in values if each in known}
     found = []

@@ -17,7 +17,7 @@ class AtWork(Learner):
         known = config_class(values.get("method", DEFAULT_METHOD)).fields()
         config = TrainConfig(**{name: usual[name] for name in usual if name in known} | values)
         super().__init__(config, Discretizer((len(table),), (-1.0,), (1.0,)))
-        self.q = self.memory.q_table
+        self.q = self.memory[0]
         self.q[:] = np.ravel(table)
         self.begin(0)
 

@@ -12,11 +12,13 @@ import numpy.typing as npt
 
 from mjcartpole.errors import check_known
 from mjcartpole.learning.methods import (
+    actor_critic,
     double_q,
     expected_sarsa,
     model,
     n_step_sarsa,
     q_learning,
+    reinforce,
     sarsa,
 )
 from mjcartpole.learning.methods.experience import Trajectory, Transition
@@ -65,6 +67,8 @@ METHODS: Final[dict[str, Any]] = {
     "n-step-sarsa": n_step_sarsa,
     "double-q": double_q,
     "model": model,
+    "reinforce": reinforce,
+    "actor-critic": actor_critic,
 }
 """Every method by its name; each value is a `Method`."""
 
