@@ -99,11 +99,15 @@ def test_a_training_goes_on_from_its_checkpoint(config, tmp_path):
 EVALUATED = TrainConfig(backend="gym", episodes=12, evaluate_every=3)
 
 
-def test_evaluations_come_back_to_the_digit(tmp_path):
-    saved = checkpoint_after(7, EVALUATED)
-    save_checkpoint(tmp_path, saved)
+@pytest.fixture(scope="module")
+def evaluated():
+    return checkpoint_after(7, EVALUATED)
+
+
+def test_evaluations_come_back_to_the_digit(evaluated, tmp_path):
+    save_checkpoint(tmp_path, evaluated)
     loaded = load_checkpoint(tmp_path / LATEST, EVALUATED, DOCUMENT).snapshot.evaluations
-    assert loaded == saved.snapshot.evaluations
+    assert loaded == evaluated.snapshot.evaluations
     assert [(point.episodes, type(point.steps)) for point in loaded] == [(3, int), (6, int)]
 
 
@@ -117,8 +121,8 @@ def test_evaluations_come_back_to_the_digit(tmp_path):
         np.zeros(99),
     ],
 )
-def test_evaluations_that_the_training_does_not_have_are_refused(numbers, tmp_path):
-    save_checkpoint(tmp_path, checkpoint_after(7, EVALUATED))
+def test_evaluations_that_the_training_does_not_have_are_refused(numbers, evaluated, tmp_path):
+    save_checkpoint(tmp_path, evaluated)
     path = tmp_path / LATEST
     path.write_bytes(forged(path.read_bytes(), evaluations=numbers))
     assert_refused(path, EVALUATED)

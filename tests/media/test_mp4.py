@@ -61,6 +61,7 @@ def test_a_name_that_ffmpeg_would_take_for_a_protocol(tmp_path, monkeypatch):
     assert os.listdir() == ["concat:a|b.mp4"]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="counts threads in /proc")
 def test_no_thread_outlives_a_film(tmp_path):
     code = """

@@ -4,11 +4,12 @@ import gymnasium
 import numba
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from mjcartpole.learning import stepping
 from mjcartpole.physics.cartpole_v1 import FORCE, cartpole_v1_step
+from nightly import examples
 
 GYM = gymnasium.make("CartPole-v1", disable_env_checker=True).unwrapped
 
@@ -36,7 +37,7 @@ anything = st.floats(-1e100, 1e100)
 
 
 @given(st.tuples(*[anything] * 4), st.integers(0, 1))
-@settings(max_examples=500)
+@examples(500)
 @example((0.0, -0.0, -0.0, 0.0), 0)
 @example((2.4, 1e-310, 0.2095, -5e-324), 1)
 def test_any_state_moves_as_in_gymnasium(state, action):

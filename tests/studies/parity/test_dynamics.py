@@ -12,7 +12,8 @@ from nightly import few
 from parity_cases import POLE, WRONG, changed, climb, failures
 
 
-@pytest.mark.parametrize("height", few(["0", "1e-14", "1e-9", "1e-6", "-1e-7"], "1e-9"))
+@pytest.mark.slow
+@pytest.mark.parametrize("height", ["0", "1e-14", "1e-9", "1e-6", "-1e-7"])
 def test_a_pole_that_is_balanced_on_its_hinge(height):
     text = changed((POLE, POLE.replace('"0 0 0.5"', f'"0 0 {height}"')))
     subject, results = climb(text, "itself", (2, 3, 4, 6, 9))
