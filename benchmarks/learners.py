@@ -18,8 +18,9 @@ from typing import Any
 import numpy as np
 
 from mjcartpole.cores import available_cores
-from mjcartpole.learning.config import PRESETS, TrainConfig
+from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.evaluation import evaluate
+from mjcartpole.learning.presets import PRESETS
 from mjcartpole.learning.training import train
 
 # What was tried around `tuned`: each entry changes its defaults.

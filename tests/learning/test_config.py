@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from mjcartpole.errors import ConfigError
-from mjcartpole.learning.config import PRESETS, TrainConfig
+from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.methods import METHODS
+from mjcartpole.learning.presets import PRESETS
 
 
 def test_the_default_is_tuned():

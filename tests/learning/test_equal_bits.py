@@ -19,9 +19,10 @@ from engines import (
     write,
 )
 from mjcartpole.errors import SimulationError
-from mjcartpole.learning.config import PRESETS, TrainConfig
+from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.evaluation import evaluate
 from mjcartpole.learning.methods import METHODS
+from mjcartpole.learning.presets import PRESETS
 from mjcartpole.learning.training import train
 from mjcartpole.physics.load import load_model
 from nightly import at_night, examples, few

@@ -12,6 +12,9 @@ from nightly import few
 FORMER = {"episodes": 1_500, "decay": 0.5, "mirror": False}
 """What `tuned` was in 0.1.0."""
 
+FORMER_TWO_POLES = {"bins": (3, 1, 8, 8, 8, 8), "alpha": 0.1, "tilings": 1, "mirror": False}
+"""What `two-poles` was; beside its episodes."""
+
 PRESETS = [
     (
         TrainConfig.preset("tuned", **FORMER),
@@ -57,7 +60,7 @@ PRESETS = [
         "e8c1c934ab156b9e080b030d9f0b184aab49e93cc46dbbeb58637085c08b43b0",
     ),
     (
-        TrainConfig.preset("two-poles", episodes=1_000),
+        TrainConfig.preset("two-poles", episodes=1_000, **FORMER_TWO_POLES),
         "80588b50a22ceec84d597e568da44ba22af26f3d26030d86a61be1bbf850dcb2",
         "0b542e05089a8ffbaf8011a7ff92b762a4bf5575ef216b053db034d92a4da246",
     ),
@@ -74,7 +77,7 @@ LONG = [
         "43cd7d372ef33dbf607770ca3318ca557f9b0665c10d03ef75e33cda62a8f06f",
     ),
     (
-        TrainConfig.preset("two-poles"),
+        TrainConfig.preset("two-poles", episodes=30_000, **FORMER_TWO_POLES),
         "a7eba4615b6856f81507c1e8798106ad2993e01af86026a30afb5762216fc296",
         "6bc9a0773b3899367860dc1d2598329b9385b4860c47a6fadd8524fd0cff5417",
     ),

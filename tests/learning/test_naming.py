@@ -8,8 +8,9 @@ import pytest
 from hypothesis import given
 
 from mjcartpole.learning import naming
-from mjcartpole.learning.config import PRESETS, TrainConfig
+from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.naming import in_flags, namesakes, run_name, shortened
+from mjcartpole.learning.presets import PRESETS
 
 numbers = st.floats(0, 1).filter(lambda x: x != 0) | st.sampled_from([0.1, 1, 1e-5, 0.0])
 edits = st.builds(

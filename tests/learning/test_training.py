@@ -11,8 +11,9 @@ import pytest
 
 from mjcartpole.errors import ConfigError, ModelNotFoundError
 from mjcartpole.learning import compiled, training
-from mjcartpole.learning.config import PRESETS, TrainConfig
+from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.evaluation import evaluate
+from mjcartpole.learning.presets import PRESETS
 from mjcartpole.learning.training import Training, train
 from mjcartpole.physics.load import load_model
 

@@ -14,8 +14,8 @@ class RunLocation:
     """What a run is called and where it goes."""
 
     preset: str = "tuned"
-    """Where the defaults below come from: tuned, article, article-terminal, two-poles
-    or quick."""
+    """Where the defaults below come from: tuned, article, article-terminal, two-poles,
+    damped or quick."""
     run_dir: Path | None = None
     """Folder for the run; runs/<preset>-<backend>-<what was changed>-seed<seed> if left out."""
     overwrite: bool = False

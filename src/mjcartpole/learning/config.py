@@ -17,6 +17,7 @@ from mjcartpole.integrator import Integrator
 from mjcartpole.learning.discretizer import Discretizer, is_finite
 from mjcartpole.learning.methods import method_named
 from mjcartpole.learning.methods.parameters import Parameters
+from mjcartpole.learning.presets import PRESETS
 from mjcartpole.task import (
     CARTPOLE_V1,
     Task,
@@ -39,66 +40,6 @@ _MOST: Final = {"episodes": MAX_EPISODES, "log_every": MAX_EPISODES, "seed": MAX
 
 _GRID: Final = ("bins", "low", "high")
 _DIMENSIONS: Final = len(state_names())
-
-# The article's ranges, as its code has them: the float32 bound of the angle, and 3.5 rad/s.
-_ARTICLE_THETA = float(CARTPOLE_V1.observation_bound()[2])
-_ARTICLE: dict[str, Any] = {
-    "episodes": 12_000,
-    "bins": (1, 1, 25, 25),
-    "low": (-2.4, -1.0, -_ARTICLE_THETA, -3.5),
-    "high": (2.4, 1.0, _ARTICLE_THETA, 3.5),
-    "gamma": 0.95,
-    "alpha": 0.1,
-    "alpha_final": 0.1,
-    "epsilon": 0.1,
-    "epsilon_final": 0.0,
-    "q_init_low": 0.0,
-    "q_init_high": 1.0,
-    "ties": "first",
-    "decay": 0.5,
-    "td_lambda": None,
-    "learn_last_step": False,
-    "mirror": False,
-    "log_every": 2_000,
-}
-# Finer for the long pole, which turns slowly; where the cart is counts, how fast it moves does not.
-_TWO_POLES: dict[str, Any] = {
-    "model": "twopoles",
-    "episodes": 30_000,
-    "bins": (3, 1, 8, 8, 8, 8),
-    "low": (-2.0, -0.75, -0.1, -0.4, -0.2095, -1.5),
-    "high": (2.0, 0.75, 0.1, 0.4, 0.2095, 1.5),
-    "gamma": 0.998,
-    "epsilon": 0.1,
-    "decay": 1.0,
-    "q_init_low": 100.0,
-    "q_init_high": 100.0,
-    "td_lambda": 0.95,
-    "mirror": False,
-    "log_every": 3_000,
-}
-# Values drawn at random leave no ties: what acts while learning is the greedy policy itself.
-_QUICK: dict[str, Any] = {
-    "method": "model",
-    "episodes": 60,
-    "bins": (1, 3, 4, 8),
-    "low": (-2.4, -0.75, -0.2095, -1.5),
-    "high": (2.4, 0.75, 0.2095, 1.5),
-    "epsilon": 0.0,
-    "epsilon_final": 0.0,
-    "q_init_low": 49.0,
-    "q_init_high": 50.0,
-    "plan_after": "failure",
-    "log_every": 6,
-}
-PRESETS: Final[dict[str, dict[str, Any]]] = {
-    "tuned": {},
-    "article": _ARTICLE,
-    "article-terminal": {**_ARTICLE, "learn_last_step": True},
-    "two-poles": _TWO_POLES,
-    "quick": _QUICK,
-}
-"""What each preset changes in the defaults of `TrainConfig`, which are those of `tuned`."""
 
 DEFAULT_METHOD: Final = "q-learning"
 """The method of every preset that names no other."""
@@ -199,7 +140,7 @@ class TrainConfig:
         With another method than its own, a preset gives what that method has of it.
 
         Args:
-            name: `tuned`, `article`, `article-terminal`, `two-poles` or `quick`.
+            name: `tuned`, `article`, `article-terminal`, `two-poles`, `damped` or `quick`.
             changes: Any field of the config.
 
         Raises:

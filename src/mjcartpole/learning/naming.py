@@ -8,7 +8,8 @@ from collections.abc import Iterator
 from pathlib import Path, PurePath
 from typing import Any, Final
 
-from mjcartpole.learning.config import PRESETS, TrainConfig
+from mjcartpole.learning.config import TrainConfig
+from mjcartpole.learning.presets import PRESETS
 
 MOST_CHANGES: Final = 64
 """Bytes that say what was changed."""

@@ -43,8 +43,6 @@ class Parameters(TiledParameters):
     """Step size at the start."""
     alpha_final: float = 0.02
     """Step size once decayed."""
-    decay: float = 0.8
-    """Share of the episodes over which alpha and epsilon fall, linearly."""
 
 
 Numbers = numbers_class(Parameters, __name__)

@@ -44,8 +44,6 @@ MOST_STEPS = 10_000
 class Parameters(TiledParameters):
     """Those of action values, and n."""
 
-    decay: float = 0.8
-    """Share of the episodes over which alpha and epsilon fall, linearly."""
     n_steps: int = 8
     """Rewards that a target consists of before it bootstraps; 1 is SARSA."""
 

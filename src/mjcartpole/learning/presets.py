@@ -1,0 +1,83 @@
+"""Presets: trainings with a name, each by what it changes in the defaults of `TrainConfig`."""
+
+from typing import Any, Final
+
+from mjcartpole.task import CARTPOLE_V1
+
+# The article's ranges, as its code has them: the float32 bound of the angle, and 3.5 rad/s.
+_ARTICLE_THETA: Final = float(CARTPOLE_V1.observation_bound()[2])
+_ARTICLE: dict[str, Any] = {
+    "episodes": 12_000,
+    "bins": (1, 1, 25, 25),
+    "low": (-2.4, -1.0, -_ARTICLE_THETA, -3.5),
+    "high": (2.4, 1.0, _ARTICLE_THETA, 3.5),
+    "gamma": 0.95,
+    "alpha": 0.1,
+    "alpha_final": 0.1,
+    "epsilon": 0.1,
+    "epsilon_final": 0.0,
+    "q_init_low": 0.0,
+    "q_init_high": 1.0,
+    "ties": "first",
+    "decay": 0.5,
+    "td_lambda": None,
+    "learn_last_step": False,
+    "mirror": False,
+    "log_every": 2_000,
+}
+# Braked, a pole lags behind every push: where the cart is and how fast it moves both count.
+_DAMPED: dict[str, Any] = {
+    "set": ("hinge.damping=0.5",),
+    "episodes": 2_000,
+    "bins": (4, 4, 6, 4),
+    "low": (-2.4, -1.5, -0.2095, -1.0),
+    "high": (2.4, 1.5, 0.2095, 1.0),
+    "tilings": 8,
+    "gamma": 0.995,
+    "alpha": 0.3,
+    "q_init_low": 100.0,
+    "q_init_high": 100.0,
+    "td_lambda": 0.95,
+    "log_every": 200,
+}
+# Finer for the long pole, which turns slowly.
+_TWO_POLES: dict[str, Any] = {
+    "model": "twopoles",
+    "episodes": 15_000,
+    "bins": (4, 4, 5, 5, 5, 5),
+    "low": (-2.0, -0.75, -0.1, -0.4, -0.2095, -1.5),
+    "high": (2.0, 0.75, 0.1, 0.4, 0.2095, 1.5),
+    "tilings": 8,
+    "gamma": 0.998,
+    "alpha": 0.3,
+    "epsilon": 0.1,
+    "decay": 1.0,
+    "q_init_low": 100.0,
+    "q_init_high": 100.0,
+    "td_lambda": 0.95,
+    "log_every": 1_500,
+}
+# Values drawn at random leave no ties: what acts while learning is the greedy policy itself.
+_QUICK: dict[str, Any] = {
+    "method": "model",
+    "episodes": 60,
+    "bins": (1, 3, 4, 8),
+    "low": (-2.4, -0.75, -0.2095, -1.5),
+    "high": (2.4, 0.75, 0.2095, 1.5),
+    "epsilon": 0.0,
+    "epsilon_final": 0.0,
+    "q_init_low": 49.0,
+    "q_init_high": 50.0,
+    "plan_after": "failure",
+    "log_every": 6,
+}
+
+PRESETS: Final[dict[str, dict[str, Any]]] = {
+    "tuned": {},
+    "article": _ARTICLE,
+    "article-terminal": {**_ARTICLE, "learn_last_step": True},
+    "two-poles": _TWO_POLES,
+    "damped": _DAMPED,
+    "quick": _QUICK,
+}
+"""What each preset changes in the defaults of `TrainConfig`, which are those of `tuned`."""
