@@ -84,3 +84,22 @@ class Corridor:
 
     def value(self, p):
         return (2 * p - 4) / (p * (1 - p))
+
+
+def counted(played, n):
+    """Return mean rewards, shape (n, 2), and shares of next states, (n, 2, n), of episodes."""
+    leads, rewards, visits = np.zeros((n, 2, n)), np.zeros((n, 2)), np.zeros((n, 2))
+    for s, a, r, s_next, terminated in (step for steps in played for step in steps):
+        visits[s, a] += 1
+        rewards[s, a] += r
+        leads[s, a, s_next] += not terminated
+    assert visits.min() > 0
+    return rewards / visits, leads / visits[..., None]
+
+
+def best_values(rewards, leads, gamma):
+    """Return the values of both actions of who acts best, by iteration on matrices."""
+    values = np.zeros_like(rewards)
+    for _ in range(1_000):
+        values = rewards + gamma * leads @ values.max(axis=1)
+    return values

@@ -31,8 +31,11 @@ class AtWork(Learner):
     def act(self, s):
         return self.method.act(self.p, self.memory, self.rates, s, self.rng)
 
-    def step(self, s, a, r, s_next, *, terminated=False, truncated=False):
-        step = Transition(s, a, r, s_next, terminated, terminated or truncated)
+    def transition(self, s, a, r, s_next, *, terminated=False, truncated=False):
+        return Transition(s, a, r, s_next, terminated, terminated or truncated)
+
+    def step(self, *values, **ending):
+        step = self.transition(*values, **ending)
         self.method.after_step(self.p, self.memory, self.rates, step, self.rng)
 
     def replay(self, states, actions, rewards, *, terminated):

@@ -66,15 +66,24 @@ def make_counts(p: Any, n_rows: int) -> Counts:
     """
     pairs = N_ACTIONS * n_rows
     places = pairs * p.successors
-    if places > MOST:
-        raise ConfigError(
-            f"{n_rows:,} states with {p.successors} successors for each action make "
-            f"{places:,} counts; the most is {MOST:,}: give fewer bins or successors"
-        )
+    check_places(n_rows, "successors", p.successors, places)
     visits, successors, counts, seen, n_seen = (
         np.zeros(n, np.int64) for n in (pairs, places, places, pairs, 1)
     )
     return Counts(visits, np.zeros(pairs), successors, counts, seen, n_seen)
+
+
+def check_places(n_rows: int, what: str, length: int, places: int) -> None:
+    """Refuse lists that would need too much memory.
+
+    Raises:
+        ConfigError: See above.
+    """
+    if places > MOST:
+        raise ConfigError(
+            f"{n_rows:,} states with {length} {what} each make lists of {places:,} places; "
+            f"the most is {MOST:,}: give fewer bins or {what}"
+        )
 
 
 def count(p: Any, memory: Any, step: Transition) -> None:

@@ -1,0 +1,41 @@
+"""A tree of sums in a flat array: draws in proportion to weights that change, in log n steps.
+
+Node k has its children at 2 k and 2 k + 1, the root is 1, and the leaves are the second half of the
+array, whose length is a power of two.
+"""
+
+import numpy as np
+import numpy.typing as npt
+
+from mjcartpole.learning.methods.action_values import FloatMemory
+
+
+def make_tree(leaves: int) -> npt.NDArray[np.float64]:
+    """Return a tree of zeros with at least so many leaves."""
+    return np.zeros(2 << (leaves - 1).bit_length())
+
+
+def set_leaf(tree: FloatMemory, leaf: int, weight: float) -> None:
+    """Change one weight and the sums above it."""
+    node = len(tree) // 2 + leaf
+    tree[node] = weight
+    while node > 1:
+        node //= 2
+        tree[node] = tree[2 * node] + tree[2 * node + 1]
+
+
+def weight_of(tree: FloatMemory, leaf: int) -> float:
+    """Return the weight of a leaf."""
+    return tree[len(tree) // 2 + leaf]
+
+
+def find_leaf(tree: FloatMemory, sum_before: float) -> int:
+    """Return the leaf in whose weight a sum over all, from the first on, comes to lie."""
+    node = 1
+    while 2 * node < len(tree):
+        node *= 2
+        # Rounding may lift the sum above all weights: to where there is none it does not go.
+        if sum_before >= tree[node] and tree[node + 1] > 0:
+            sum_before -= tree[node]
+            node += 1
+    return node - len(tree) // 2
