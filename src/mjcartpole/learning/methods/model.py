@@ -73,20 +73,20 @@ begin_episode = explore
 
 
 class Memory(NamedTuple):
-    """The counts, see `Counts`, and the table of values."""
+    """The table, and the counts, see `Counts`."""
 
+    q_table: Table
     visits: IntMemory
     rewards: FloatMemory
     successors: IntMemory
     counts: IntMemory
     seen: IntMemory
     n_seen: IntMemory
-    q_table: Table
 
 
 def make_memory(p: Any, n_rows: int, rng: np.random.Generator) -> Memory:
     """Return a table to begin with, and counts of nothing."""
-    return Memory(*make_counts(p, n_rows), draw_table(p, n_rows, rng))
+    return Memory(draw_table(p, n_rows, rng), *make_counts(p, n_rows))
 
 
 def after_step(

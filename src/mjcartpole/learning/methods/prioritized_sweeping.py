@@ -79,8 +79,9 @@ after_episode = learn_no_more
 
 
 class Memory(NamedTuple):
-    """The counts, see `Counts`, the table, the queue, see `Queue`, and what led where."""
+    """The table, the counts, see `Counts`, the queue, see `Queue`, and what led where."""
 
+    q_table: Table
     visits: IntMemory
     rewards: FloatMemory
     successors: IntMemory
@@ -91,7 +92,6 @@ class Memory(NamedTuple):
     place: IntMemory
     priority: FloatMemory
     n_queued: IntMemory
-    q_table: Table
     predecessors: IntMemory
     """Lists of pairs, one for each row …"""
     n_predecessors: IntMemory
@@ -102,9 +102,9 @@ def make_memory(p: Any, n_rows: int, rng: np.random.Generator) -> Memory:
     """Return a table to begin with, counts of nothing and an empty queue."""
     check_places(n_rows, "predecessors", p.predecessors, n_rows * p.predecessors)
     return Memory(
+        draw_table(p, n_rows, rng),
         *make_counts(p, n_rows),
         *make_queue(N_ACTIONS * n_rows),
-        draw_table(p, n_rows, rng),
         np.zeros(n_rows * p.predecessors, np.int64),
         np.zeros(n_rows, np.int64),
     )
