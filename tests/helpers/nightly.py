@@ -4,6 +4,7 @@ import os
 
 import pytest
 from hypothesis import settings
+from hypothesis import strategies as st
 
 FAST = "MJCARTPOLE_FAST_TESTS"
 """Set while the slow tests are left out."""
@@ -17,6 +18,13 @@ def examples(count):
 def at_night(count, *, fast):
     """So many at night, fewer in the fast set."""
     return fast if FAST in os.environ else count
+
+
+def characters(*, control=True):
+    """Characters of texts: of all Unicode at night, for to list it takes seconds."""
+    some = "a1 <>&\"';=/ä→文🂡\u00a0\u2028" + "\n\t\0" * control
+    every = st.characters(codec="utf-8", exclude_categories=[] if control else ["C"])
+    return at_night(every, fast=st.sampled_from(some))
 
 
 def few(cases, *fast):

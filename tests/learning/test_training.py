@@ -16,6 +16,7 @@ from mjcartpole.learning.evaluation import evaluate
 from mjcartpole.learning.presets import PRESETS
 from mjcartpole.learning.training import Training, train
 from mjcartpole.physics.load import load_model
+from nightly import few
 
 ENGINES = ("python", "compiled")
 
@@ -31,8 +32,11 @@ def test_the_docstrings_hold():
 
 @pytest.mark.parametrize(
     ("preset", "backend"),
-    [(name, "mujoco") for name in PRESETS]
-    + [(name, "gym") for name in PRESETS if "model" not in PRESETS[name]],
+    few(
+        [(name, "mujoco") for name in PRESETS]
+        + [(name, "gym") for name in PRESETS if "model" not in PRESETS[name]],
+        *(("tuned", "mujoco"), ("two-poles", "mujoco"), ("article", "gym"), ("quick", "gym")),
+    ),
 )
 def test_one_seed_gives_one_table_and_two_seeds_give_two(preset, backend):
     def run(seed):

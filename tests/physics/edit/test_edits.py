@@ -21,7 +21,7 @@ from mjcartpole.physics.edit.edits import (
 from mjcartpole.physics.load import load_model
 from mjcartpole.physics.parameters import read_parameters
 from mjcartpole.physics.unmodelled_effects import differs_from
-from nightly import at_night, examples
+from nightly import at_night, characters, examples
 
 REFERENCE = load_model("cartpole").xml
 BOB = load_model("bob").xml
@@ -155,7 +155,10 @@ KEYS = [*EDIT_NAMES, "joint:hinge.damping", "option.integrator", "geom:pole.size
 
 
 @examples(200)
-@given(st.text(max_size=12) | st.sampled_from(KEYS), st.none() | st.floats() | st.text(max_size=8))
+@given(
+    st.text(characters(), max_size=12) | st.sampled_from(KEYS),
+    st.none() | st.floats() | st.text(characters(), max_size=8),
+)
 def test_anything_gives_a_document_or_one_clear_line(key, value):
     try:
         text = edit_document(REFERENCE, {key: value})
