@@ -41,9 +41,9 @@ class Parameters(PreferenceParameters):
 
     gamma: float = 0.99
     """Discount per step."""
-    alpha: float = 0.005
+    alpha: float = 0.003
     """Step size of the preferences at the start."""
-    alpha_final: float = 0.005
+    alpha_final: float = 0.003
     """Step size of the preferences once decayed."""
     alpha_values: float = 0.005
     """Step size of the values of states at the start."""
