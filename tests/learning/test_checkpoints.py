@@ -22,6 +22,7 @@ from mjcartpole.learning.checkpoints import (
     save_checkpoint,
 )
 from mjcartpole.learning.config import TrainConfig
+from mjcartpole.learning.methods import METHODS
 from mjcartpole.learning.training import Training
 from nightly import examples, few
 
@@ -85,7 +86,9 @@ def test_a_checkpoint_comes_back_bit_for_bit(checkpoint, content, scratch):
         TrainConfig(backend="gym", episodes=12, td_lambda=None, ties="random"),
         TrainConfig.preset("article", episodes=12, bins=(2, 2, 2, 2)),
         TrainConfig(episodes=12, integrator="mujoco"),
+        *(TrainConfig(backend="gym", episodes=12, method=method) for method in METHODS),
     ],
+    ids=str,
 )
 def test_a_training_goes_on_from_its_checkpoint(config, tmp_path):
     save_checkpoint(tmp_path, checkpoint_after(7, config))
@@ -93,6 +96,9 @@ def test_a_training_goes_on_from_its_checkpoint(config, tmp_path):
     resumed.restore(load_checkpoint(tmp_path / LATEST, config, DOCUMENT).snapshot)
     assert list(whole.run())[7:] == list(resumed.run())
     assert resumed.result().q_table.tobytes() == whole.result().q_table.tobytes()
+    memories = (training.snapshot().memory for training in (resumed, whole))
+    for ours, theirs in zip(*(memory.items() for memory in memories), strict=True):
+        assert (ours[0], ours[1].tobytes()) == (theirs[0], theirs[1].tobytes())
     assert list(resumed.log) == list(whole.log)
 
 

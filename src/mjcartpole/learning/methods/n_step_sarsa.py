@@ -70,7 +70,7 @@ class Memory(NamedTuple):
     q_table: Table
     next_action: IntMemory
     """Shape (1,); -1 at the start of an episode."""
-    steps: IntMemory
+    steps_done: IntMemory
     """Of the episode so far; shape (1,)."""
     states: IntMemory
     """Of step t at t modulo n, shape (n_steps,); so the other two."""
@@ -89,16 +89,16 @@ def after_step(
     p: Any, memory: Memory, rates: Rates, step: Transition, rng: np.random.Generator
 ) -> None:
     """Draw the next action, and learn from the step that is n - 1 steps old, or at the end all."""
-    q, n, t = memory.q_table, p.n_steps, memory.steps[0]
+    q, n, t = memory.q_table, p.n_steps, memory.steps_done[0]
     slot = t % n
     memory.states[slot], memory.actions[slot], memory.rewards[slot] = step.s, step.a, step.r
     a_next, target, kept = -1, 0.0, min(t + 1, n)
     if not step.terminated:
         a_next = choose(p, q, step.s_next, rates.epsilon, rng)
         target = value(p, q, step.s_next, a_next)
-    memory.steps[0], memory.next_action[0] = t + 1, a_next
+    memory.steps_done[0], memory.next_action[0] = t + 1, a_next
     if step.over:
-        memory.steps[0], memory.next_action[0] = 0, -1
+        memory.steps_done[0], memory.next_action[0] = 0, -1
         if not p.learn_last_step:
             target, kept, slot = value(p, q, step.s, step.a), kept - 1, (slot - 1) % n
     if step.over or kept == n:
