@@ -121,8 +121,8 @@ def test_foreign_files_are_refused(tmp_path, content):
 def test_a_later_version_is_named(tmp_path):
     path = tmp_path / "policy.json"
     some_policy().save(path)
-    path.write_text(path.read_text().replace('"version": 1', '"version": 3'))
-    with pytest.raises(PolicyFileError, match="has version 3; this mjcartpole reads versions 1"):
+    path.write_text(path.read_text().replace('"version": 1', '"version": 4'))
+    with pytest.raises(PolicyFileError, match="has version 4; this mjcartpole reads versions 1, 2"):
         Policy.load(path)
 
 

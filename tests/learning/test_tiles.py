@@ -74,12 +74,13 @@ def test_one_grid_is_a_table():
     assert pair_at(None, q, 1) == (3.5, 4.0)
 
 
+@pytest.mark.parametrize("kind", [{"tilings": 4}, {"interpolated": True}], ids=str)
 @pytest.mark.parametrize("mirror", [False, True])
-def test_a_policy_of_tilings_is_kept_in_a_file(tmp_path, mirror):
-    discretizer = Discretizer((2, 3, 1, 2), LOW, HIGH, mirror=mirror, tilings=4)
+def test_a_policy_of_several_rows_is_kept_in_a_file(tmp_path, mirror, kind):
+    discretizer = Discretizer((2, 3, 1, 2), LOW, HIGH, mirror=mirror, **kind)
     values = np.random.default_rng(0).normal(size=(discretizer.n_rows, 2))
     policy = Policy.learned(discretizer, values)
-    assert policy.q_table.shape == (4, 2, 3, 1, 2, 2)
+    assert policy.q_table.shape == (*discretizer.shape, 2)
     policy.save(tmp_path / "policy.json")
     again = Policy.load(tmp_path / "policy.json")
     assert again.discretizer == discretizer
@@ -89,6 +90,38 @@ def test_a_policy_of_tilings_is_kept_in_a_file(tmp_path, mirror):
         assert again(state) == policy(state) == int(right > left)
         if mirror:
             assert policy.values(-state) == (right, left)
+
+
+@given(
+    st.tuples(*[st.integers(1, 6)] * 4),
+    st.tuples(*[st.floats(-1.5, 1.5)] * 4),
+)
+def test_between_nodes_is_what_is_multilinear(bins, state):
+    discretizer = Discretizer(bins, LOW, HIGH, interpolated=True)
+
+    def height(x, v, z, w):
+        return 3 * x - v * w + 4 * z
+
+    ends = [(-end, end) if n > 1 else (0.0, 0.0) for n, end in zip(bins, HIGH, strict=True)]
+    axes = [np.linspace(*each, n) for each, n in zip(ends, bins, strict=True)]
+    q = np.repeat(height(*np.meshgrid(*axes, indexing="ij")), 2)
+    q[1::2] *= 2
+    found = pair_at(tiles_of(discretizer), q, discretizer(state))
+    # A state counts as the middle of its cell, of which there are 1,024 between two nodes.
+    half = [end / (n - 1) / 1024 if n > 1 else 0.0 for n, end in zip(bins, HIGH, strict=True)]
+    off = 3 * half[0] + 1.5 * half[1] + 4 * half[2] + 2 * half[3] + 1e-9
+    inside = height(*(np.clip(value, *each) for value, each in zip(state, ends, strict=True)))
+    assert found == (pytest.approx(inside, abs=off), pytest.approx(2 * inside, abs=2 * off))
+
+
+def test_nodes_are_states_and_what_is_learned_at_one_stays_there():
+    discretizer = Discretizer((3, 2), LOW[:2], HIGH[:2], interpolated=True)
+    tiles, q = tiles_of(discretizer), np.zeros(2 * discretizer.n_rows)
+    add_at(tiles, q, discretizer([0.0, 2.5]), 1, 8.0)
+    assert q.reshape(3, 2, 2)[1, 1].tolist() == [0.0, 8.0] and q.sum() == 8.0
+    assert pair_at(tiles, q, discretizer([0.25, 1.0])) == (0.0, 8.0 * 0.75 * 0.75)
+    add_at(tiles, q, discretizer([-0.5, -2.0]), 0, 4.0)
+    assert q.reshape(3, 2, 2)[:2, 0, 0].tolist() == [2.0, 2.0]
 
 
 def test_the_mirror_image_of_a_choice():

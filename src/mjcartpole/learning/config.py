@@ -140,7 +140,8 @@ class TrainConfig:
         With another method than its own, a preset gives what that method has of it.
 
         Args:
-            name: `tuned`, `article`, `article-terminal`, `two-poles`, `damped` or `quick`.
+            name: `tuned`, `article`, `article-terminal`, `two-poles`, `damped`, `quick` or
+                `planned`.
             changes: Any field of the config.
 
         Raises:
@@ -207,7 +208,8 @@ class TrainConfig:
                     f"give {_DIMENSIONS}{also} ({', '.join(state_names(poles))})"
                 )
         bins, low, high = (_for_each_pole(getattr(self, name), poles) for name in _GRID)
-        return Discretizer(bins, low, high, bool(self.mirror), self.values().get("tilings", 1))
+        tilings = self.values().get("tilings", 1)
+        return Discretizer(bins, low, high, bool(self.mirror), tilings, self.interpolated)
 
     @property
     def evaluation_period(self) -> int | None:

@@ -20,6 +20,9 @@ TILINGS: Final = (1, 2, 4, 8, 16, 32, 64)
 UNFOLDED: Final = 2**62
 """More states than any grid has: none of its rows stands for another one."""
 
+_CELL_BITS: Final = 42
+"""Of a state's number for its place between nodes; 20 are left for which nodes these are."""
+
 Ints: TypeAlias = Sequence[int] | npt.NDArray[np.int64]
 Floats: TypeAlias = Sequence[float] | npt.NDArray[np.float64]
 """Plain Python is quicker with the one, compiled code with the other."""
@@ -77,7 +80,10 @@ class Discretizer:
         high: Upper end.
         mirror: Whether a learner takes a state and its mirror image for the same one.
         tilings: How many such grids, each a little offset, are summed (see tiles.py).
-        grid: The same for `row_of`; of several tilings the fine one that all their edges make.
+        interpolated: Whether bins are nodes, evenly from `low` to `high`, with values in between
+            (see tiles.py).
+        grid: The same for `row_of`; of several tilings the fine one that all their edges make, and
+            between nodes a fine one with a cell around each.
     """
 
     bins: tuple[int, ...]
@@ -85,6 +91,7 @@ class Discretizer:
     high: tuple[float, ...]
     mirror: bool = False
     tilings: int = 1
+    interpolated: bool = False
     grid: Grid = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -93,14 +100,25 @@ class Discretizer:
         bins = tuple(self.bins[dimension] for dimension in used)
         low = tuple(float(self.low[dimension]) for dimension in used)
         high = tuple(float(self.high[dimension]) for dimension in used)
-        width = tuple((b - a) / n for n, a, b in zip(bins, low, high, strict=True))
-        if self.tilings > 1:
-            low = tuple(a + (w - w / self.tilings) / 2 for a, w in zip(low, width, strict=True))
-            bins = tuple((n - 1) * self.tilings + 1 for n in bins)
-            width = tuple(w / self.tilings for w in width)
+        gaps = tuple(n - self.interpolated for n in bins)
+        width = tuple((b - a) / n for n, a, b in zip(gaps, low, high, strict=True))
+        if (parts := self.parts) > 1:
+            # The first cell has the first node in its middle, or ends where the first bins do.
+            edge = 0 if self.interpolated else 1
+            low = tuple(a + (edge * w - w / parts) / 2 for a, w in zip(low, width, strict=True))
+            bins = tuple((n - 1) * parts + 1 for n in bins)
+            width = tuple(w / parts for w in width)
             high = tuple(a + n * w for a, n, w in zip(low, bins, width, strict=True))
         folding = math.prod(bins) if self.mirror else UNFOLDED
         object.__setattr__(self, "grid", Grid(used, bins, low, high, width, folding))
+
+    @property
+    def parts(self) -> int:
+        """Into how many cells a bin, or the gap between two nodes, is cut: a power of two."""
+        dimensions = sum(n > 1 for n in self.bins)
+        if not (self.interpolated and dimensions):
+            return self.tilings
+        return 1 << min(10, _CELL_BITS // dimensions)
 
     @property
     def n_states(self) -> int:
@@ -162,6 +180,8 @@ class Discretizer:
         if self.tilings not in TILINGS:
             known = ", ".join(map(str, TILINGS))
             raise ConfigError(f"tilings must be one of {known}, not {self.tilings!r}")
+        if self.tilings > 1 and self.interpolated:
+            raise ConfigError("tilings are for bins, not for nodes between which is interpolated")
         rows = self.tilings * math.prod(self.bins)
         if rows > MAX_STATES:
             times = f" in {self.tilings} tilings" if self.tilings > 1 else ""

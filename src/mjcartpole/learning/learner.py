@@ -8,6 +8,7 @@ import numpy.typing as npt
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.discretizer import Discretizer
 from mjcartpole.learning.methods import method_named
+from mjcartpole.learning.methods.experience import Dynamics
 from mjcartpole.learning.methods.parameters import numbers_of
 from mjcartpole.learning.tiles import tiles_of
 
@@ -38,6 +39,16 @@ class Learner:
         self.rng = np.random.default_rng(np.random.SeedSequence(config.seed, spawn_key=(STREAM,)))
         self.memory = self.method.make_memory(self.p, discretizer.n_rows, self.rng)
         self.episodes = config.episodes
+        self._discretizer = discretizer
+
+    @property
+    def plans(self) -> bool:
+        """Whether the method learns from equations before the first episode."""
+        return hasattr(self.method, "plan")
+
+    def plan(self, dynamics: Dynamics) -> None:
+        """Learn from equations."""
+        self.method.plan(self.p, self.memory, self._discretizer, dynamics)
 
     @property
     def greedy_values(self) -> npt.NDArray[np.float64]:

@@ -24,8 +24,8 @@ from mjcartpole.learning.tiles import Tiles, greedy, pair_at, tiles_of
 from mjcartpole.task import N_ACTIONS, in_words, state_names
 
 FORMAT = "mjcartpole-policy"
-VERSION, TILED_VERSION = 1, 2
-"""Of a file with one grid, and with several tilings."""
+VERSION = 1
+"""Of a file with one grid of bins."""
 
 _MOST_BYTES: Final = 2**26
 """The largest table, with all digits, takes 56 MB."""
@@ -39,7 +39,12 @@ _FIELDS: Final = {
     "high": tuple[float, ...],
     "q_table": tuple[tuple[float, ...], ...],
 }
-_TILED_FIELDS: Final = {"tilings": int, "mirror": bool}
+_MORE_FIELDS: Final[dict[int, dict[str, type]]] = {
+    VERSION: {},
+    2: {"tilings": int, "mirror": bool},
+    3: {"interpolated": bool, "mirror": bool},
+}
+"""What a file of each version has besides: of several tilings, and of nodes."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -49,9 +54,9 @@ class Policy:
     Attributes:
         discretizer: From observations to states.
         q_table: Action values, float64, shape (*bins, 2); of several tilings (tilings, *bins, 2).
-        tiles: How those are summed; None for one grid.
-        choices: What `greedy` looks at: of one grid the better action of each row, shape
-            (n_states,), int64; of several tilings the flat table.
+        tiles: How those are summed, or interpolated between nodes; None for one grid of bins.
+        choices: What `greedy` looks at: of one grid of bins the better action of each row, shape
+            (n_states,), int64; else the flat table.
     """
 
     discretizer: Discretizer
@@ -80,10 +85,10 @@ class Policy:
     def learned(cls, discretizer: Discretizer, values: npt.NDArray[np.float64]) -> "Policy":
         """Return the policy of a learner's greedy values, shape (n_rows, 2), which are copied.
 
-        A mirrored grid is written out; of several tilings the fold stays, for they are no mirror
-        images of each other.
+        A mirrored grid of bins is written out; of several tilings the fold stays, for they are no
+        mirror images of each other.
         """
-        if discretizer.mirror and discretizer.tilings == 1:
+        if discretizer.mirror and tiles_of(discretizer) is None:
             values = discretizer.unfolded(values)
             discretizer = dataclasses.replace(discretizer, mirror=False)
         return cls(discretizer, values.reshape(*discretizer.shape, N_ACTIONS).copy())
@@ -103,7 +108,8 @@ class Policy:
     def __repr__(self) -> str:
         grid = self.discretizer
         tilings = f"tilings={grid.tilings}, " if grid.tilings > 1 else ""
-        return f"Policy({tilings}bins={grid.bins}, {grid.n_states:,} states)"
+        kind, n = ("nodes", grid.n_rows) if grid.interpolated else ("states", grid.n_states)
+        return f"Policy({tilings}bins={grid.bins}, {n:,} {kind})"
 
     @property
     def poles(self) -> int:
@@ -159,15 +165,15 @@ class Policy:
 
 def _to_text(policy: Policy) -> str:
     grid = policy.discretizer
+    version = 3 if grid.interpolated else VERSION if grid.tilings == 1 else 2
     content: dict[str, Any] = {
         "bins": list(grid.bins),
         "low": list(grid.low),
         "high": list(grid.high),
-        **({"tilings": grid.tilings, "mirror": grid.mirror} if grid.tilings > 1 else {}),
+        **{name: getattr(grid, name) for name in _MORE_FIELDS[version]},
         "q_table": policy.q_table.reshape(-1, N_ACTIONS).tolist(),
     }
     checksum = hashlib.sha256(json.dumps(content).encode()).hexdigest()
-    version = VERSION if grid.tilings == 1 else TILED_VERSION
     head = {"format": FORMAT, "version": version, "sha256": checksum}
     # One line per row of the table: a person can read it, a diff can show it.
     rows = ",\n".join(f"  {json.dumps(row)}" for row in content.pop("q_table"))
@@ -182,19 +188,19 @@ def _from_json(content: bytes, path: str | os.PathLike[str]) -> Policy:
         raise _no_policy(path, f"it is not JSON, or is cut off ({brief(error)})") from error
     if not isinstance(document, dict) or document.get("format") != FORMAT:
         raise _no_policy(path, f'it lacks \'"format": "{FORMAT}"\'')
-    if (version := document.get("version")) not in (VERSION, TILED_VERSION):
+    if (version := document.get("version")) not in list(_MORE_FIELDS):
+        *others, last = map(str, _MORE_FIELDS)
         raise PolicyFileError(
             f"policy file '{path}' has version {reprlib.repr(version)}; "
-            f"this mjcartpole reads versions {VERSION} and {TILED_VERSION}"
+            f"this mjcartpole reads versions {', '.join(others)} and {last}"
         )
     try:
-        checked(document, _FIELDS if version == VERSION else _FIELDS | _TILED_FIELDS)
+        checked(document, _FIELDS | _MORE_FIELDS[version])
         discretizer = Discretizer(
             bins=tuple(document["bins"]),
             low=tuple(float(value) for value in document["low"]),
             high=tuple(float(value) for value in document["high"]),
-            mirror=document.get("mirror", False),
-            tilings=document.get("tilings", 1),
+            **{name: document[name] for name in _MORE_FIELDS[version]},
         )
         table = np.array(document["q_table"], dtype=np.float64)
         return Policy(discretizer, table.reshape(*discretizer.shape, N_ACTIONS))

@@ -71,6 +71,15 @@ _QUICK: dict[str, Any] = {
     "plan_after": "failure",
     "log_every": 6,
 }
+# Nodes on the limits, or edges would count as if nobody ever fell there.
+_PLANNED: dict[str, Any] = {
+    "method": "planning",
+    "episodes": 100,
+    "bins": (13, 13, 17, 17),
+    "low": (-2.4, -2.5, -0.2095, -2.5),
+    "high": (2.4, 2.5, 0.2095, 2.5),
+    "log_every": 10,
+}
 
 PRESETS: Final[dict[str, dict[str, Any]]] = {
     "tuned": {},
@@ -79,5 +88,6 @@ PRESETS: Final[dict[str, dict[str, Any]]] = {
     "two-poles": _TWO_POLES,
     "damped": _DAMPED,
     "quick": _QUICK,
+    "planned": _PLANNED,
 }
 """What each preset changes in the defaults of `TrainConfig`, which are those of `tuned`."""

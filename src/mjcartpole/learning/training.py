@@ -15,6 +15,7 @@ from mjcartpole.envs.backend import make_env
 from mjcartpole.errors import ConfigError, SimulationError
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.discretizer import Discretizer
+from mjcartpole.learning.dynamics import dynamics_of
 from mjcartpole.learning.engine import Engine, check_engine, choose_engine
 from mjcartpole.learning.episodes import Columns, EpisodeLog
 from mjcartpole.learning.evaluation import evaluate_where_trained
@@ -121,8 +122,8 @@ class Training:
 
         Raises:
             ConfigError: There is no such engine, the config's grid is for another number of
-                poles, what is to be mirrored is not symmetric, or greedy episodes are asked for
-                in an environment of one's own.
+                poles, what is to be mirrored is not symmetric, or greedy episodes or a plan are
+                asked for in an environment of one's own.
             ModelError: The model cannot be used.
         """
         check_engine(engine)
@@ -135,6 +136,11 @@ class Training:
             cartpole = config.load_model()
         self.discretizer = _discretizer(config, cartpole, env)
         self.learner = Learner(config, self.discretizer)
+        if env is not None and self.learner.plans:
+            raise ConfigError(
+                f"method {config.method!r} needs equations, which an environment of one's own does "
+                "not show; take the config's own"
+            )
         self.log = EpisodeLog(config.episodes)
         self.evaluations: tuple[GreedyPoint, ...] = ()
         self._cartpole = cartpole
@@ -165,6 +171,7 @@ class Training:
         run = self._run_compiled if self.engine == "compiled" else self._run_python
         if self.engine == "compiled":
             self._loop.compile(self.learner, self.discretizer, self._env_rng, self.log)
+        self._plan()
         self._evaluate_if_due()
         started = time.perf_counter() - self._seconds
         while not self.is_over:
@@ -175,6 +182,15 @@ class Training:
                 yield finished
         if self.engine == "python":
             self._env.close()
+
+    def _plan(self) -> None:
+        """Let a method that does so learn from the equations, before the first episode."""
+        if self.learner.plans and not len(self.log):
+            started = time.perf_counter()
+            self.learner.plan(
+                dynamics_of(self._cartpole, self.config.integrator, self.config.rules)
+            )
+            self._seconds = time.perf_counter() - started
 
     @property
     def is_over(self) -> bool:

@@ -5,25 +5,28 @@ compiled engine compiles them as they are, so they use what Numba knows: arithme
 functions of this package, and the draws of a `numpy.random.Generator`. `Method` says which.
 """
 
+from collections.abc import Callable
 from typing import Any, Final, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from mjcartpole.errors import check_known
+from mjcartpole.learning.discretizer import Discretizer
 from mjcartpole.learning.methods import (
     actor_critic,
     double_q,
     expected_sarsa,
     model,
     n_step_sarsa,
+    planning,
     prioritized_replay,
     prioritized_sweeping,
     q_learning,
     reinforce,
     sarsa,
 )
-from mjcartpole.learning.methods.experience import Trajectory, Transition
+from mjcartpole.learning.methods.experience import Dynamics, Trajectory, Transition
 from mjcartpole.learning.methods.parameters import Parameters
 
 
@@ -41,6 +44,10 @@ class Method(Protocol):
 
     def make_memory(self, p: Any, n_rows: int, rng: np.random.Generator) -> Any:
         """Return a NamedTuple of flat arrays: all that learning changes."""
+
+    plan: Callable[[Any, Any, Discretizer, Dynamics], None]
+    """What a method has that learns before the first episode: from p, memory, the grid, and what
+    a step does in any state. Others need not have it."""
 
     def begin_episode(self, p: Any, memory: Any, number: int, episodes: int) -> Any:
         """Return a NamedTuple of what holds during one of so many episodes, counted from 0."""
@@ -73,6 +80,7 @@ METHODS: Final[dict[str, Any]] = {
     "model": model,
     "reinforce": reinforce,
     "actor-critic": actor_critic,
+    "planning": planning,
 }
 """Every method by its name; each value is a `Method`."""
 

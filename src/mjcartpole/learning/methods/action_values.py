@@ -11,7 +11,7 @@ from mjcartpole.learning.discretizer import is_finite
 from mjcartpole.learning.methods.experience import Trajectory
 from mjcartpole.learning.methods.parameters import Parameters
 from mjcartpole.learning.schedules import linear
-from mjcartpole.learning.tiles import Table, add_at, pair_at
+from mjcartpole.learning.tiles import Table, add_at, all_weights, pair_at
 from mjcartpole.task import N_ACTIONS
 
 Ties = Literal["first", "random"]
@@ -125,7 +125,7 @@ def draw_table(p: Any, n_rows: int, rng: np.random.Generator) -> npt.NDArray[np.
     """Return a first table, flat, drawn uniformly from `q_init_low` to `q_init_high`."""
     # Without the sum, numpy calls 0.0 to -0.0 a range that runs backwards.
     table = rng.uniform(p.q_init_low, p.q_init_high + 0.0, size=n_rows * N_ACTIONS)
-    return table if p.tiles is None else table / (1 << p.tiles.bits)
+    return table / all_weights(p.tiles)
 
 
 def make_memory(p: Any, n_rows: int, rng: np.random.Generator) -> QTable:

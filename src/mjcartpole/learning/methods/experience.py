@@ -1,6 +1,10 @@
 """Experience: what a method learns from."""
 
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
 
 from mjcartpole.learning.discretizer import Floats, Ints
 
@@ -34,3 +38,9 @@ class Trajectory(NamedTuple):
     steps: int
     terminated: bool
     """Whether the rules ended it."""
+
+
+Vector: TypeAlias = npt.NDArray[np.float64]
+Dynamics: TypeAlias = Callable[[Vector, int], tuple[Vector, Vector, npt.NDArray[np.bool_]]]
+"""What methods learn from that need no episode: from states, shape (n, 2 + 2 poles), and an action
+to the next states, their rewards and whether the rules end the episode there, both shape (n,)."""

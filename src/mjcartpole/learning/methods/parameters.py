@@ -3,7 +3,7 @@
 import collections
 import dataclasses
 from dataclasses import dataclass
-from typing import Any, Literal, get_args, get_origin
+from typing import Any, ClassVar, Literal, get_args, get_origin
 
 from mjcartpole.errors import ConfigError
 from mjcartpole.learning.discretizer import is_finite
@@ -12,6 +12,9 @@ from mjcartpole.learning.discretizer import is_finite
 @dataclass(frozen=True, kw_only=True)
 class Parameters:
     """What a method can be told; the base of each method's own."""
+
+    interpolated: ClassVar[bool] = False
+    """Whether its table has nodes instead of bins, and values in between."""
 
     def check_parameters(self) -> None:
         """Refuse values that make no sense.
