@@ -118,7 +118,7 @@ def snapshots_of(config, engine):
 
 def content(snapshot):
     return (
-        snapshot.memory["q_table"].tobytes(),
+        {name: array.tobytes() for name, array in snapshot.memory.items()},
         copy.deepcopy(snapshot.env_rng),
         copy.deepcopy(snapshot.learner_rng),
         [column.tobytes() for column in snapshot.columns],
@@ -137,6 +137,9 @@ def content(snapshot):
                 {"backend": "gym"},
                 {"backend": "mujoco", "td_lambda": None, "ties": "random"},
                 {"integrator": "mujoco"},
+                {"backend": "gym", "method": "prioritized-replay"},
+                {"backend": "gym", "method": "prioritized-sweeping"},
+                {"backend": "gym", "method": "model", "plan_after": "failure"},
             )
         ),
     ],
