@@ -25,7 +25,7 @@ print({"OpenGL", "imageio", "dm_control", "scipy"} & set(sys.modules))
         ),
     ],
 )
-def test_training_works_with_any_mujoco_gl_and_touches_none(choice):
+def test_training_works_with_any_mujoco_gl_and_uses_none(choice):
     done = subprocess.run(
         [sys.executable, "-c", CODE],
         env={**os.environ, "MUJOCO_GL": choice},
@@ -34,4 +34,6 @@ def test_training_works_with_any_mujoco_gl_and_touches_none(choice):
         check=False,
     )
     assert done.stderr == ""
-    assert done.stdout.split() == ["True", choice, "set()"]
+    # MuJoCo itself imports what somebody wishes.
+    loaded = str({"OpenGL"} if choice in {"egl", "osmesa"} else set())
+    assert done.stdout.split() == ["True", choice, loaded]
