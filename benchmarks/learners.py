@@ -2,24 +2,30 @@
 
     python benchmarks/learners.py presets --seeds 20 --backends mujoco gym
     python benchmarks/learners.py variants --seeds 20
+    python benchmarks/learners.py endless --names planned --seeds 1 --starts 10000
 
 Each seed is trained alone, then its greedy policy plays 100 episodes from fresh starting states.
 `last 2000` is the mean return over the last 2,000 training episodes (all, if there are fewer).
+`endless` lets the greedy policy play on for --steps from each of --starts fresh starting states.
 Seeds start at --first-seed, so that settings chosen on some seeds can be confirmed on others.
 """
 
 import argparse
+import dataclasses
 import json
 import multiprocessing
 import time
+from multiprocessing.pool import Pool
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from mjcartpole.cores import available_cores
 from mjcartpole.learning.config import TrainConfig
-from mjcartpole.learning.evaluation import evaluate
+from mjcartpole.learning.evaluation import SEED, evaluate
+from mjcartpole.learning.policy import Policy
 from mjcartpole.learning.presets import PRESETS
 from mjcartpole.learning.training import train
 
@@ -53,6 +59,8 @@ VARIANTS: dict[str, dict[str, Any]] = {
     "one step, bins 3,3,6,8": {**ONE_STEP, "bins": (3, 3, 6, 8)},
 }
 
+PART = 50  # starts that are played with one seed
+
 Job = tuple[str, TrainConfig]
 
 
@@ -76,9 +84,42 @@ def measure(job: Job) -> dict[str, Any]:
     }
 
 
+def endless(options: argparse.Namespace, pool: Pool) -> list[dict[str, Any]]:
+    """Train every seed, and let its policy play without the task's time limit."""
+    rows = []
+    for name, config in make_jobs(options):
+        policy = train(config).policy
+        parts = [(config, policy, options.steps, part) for part in range(options.starts // PART)]
+        steps = np.concatenate(list(pool.imap(play_on, parts)))
+        lasted = int((steps == options.steps).sum())
+        print(
+            f"{name:36s} {config.backend:7s} seed {config.seed}: {lasted:,} of {len(steps):,} "
+            f"starts last {options.steps:,} steps; shortest {steps.min():,}",
+            flush=True,
+        )
+        row = {"name": name, "backend": config.backend, "seed": config.seed}
+        rows.append({**row, "lasted": lasted, "starts": len(steps), "shortest": int(steps.min())})
+    return rows
+
+
+def play_on(part: tuple[TrainConfig, Policy, int, int]) -> npt.NDArray[np.int64]:
+    """Play from some of the starts; returns how many steps each lasts, shape (PART,)."""
+    config, policy, steps, number = part
+    played = evaluate(
+        policy,
+        backend=config.backend,
+        model=config.load_model() if config.backend == "mujoco" else "cartpole",
+        integrator=config.integrator,
+        task=dataclasses.replace(config.rules, name="endless", time_limit=steps),
+        episodes=PART,
+        seed=SEED + number,
+    )
+    return np.array([episode.steps for episode in played.episodes])
+
+
 def make_jobs(options: argparse.Namespace) -> list[Job]:
     """All trainings that were asked for."""
-    table = PRESETS if options.what == "presets" else VARIANTS
+    table = VARIANTS if options.what == "variants" else PRESETS
     names = options.names or list(table)
     seeds = range(options.first_seed, options.first_seed + options.seeds)
     return [
@@ -105,28 +146,37 @@ def print_group(name: str, backend: str, rows: list[dict[str, Any]]) -> None:
     )
 
 
-def main() -> None:
-    """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("what", choices=["presets", "variants"])
-    parser.add_argument("--names", nargs="*", help="only these")
-    parser.add_argument("--backends", nargs="*", default=["mujoco"], choices=["mujoco", "gym"])
-    parser.add_argument("--seeds", type=int, default=20)
-    parser.add_argument("--first-seed", type=int, default=1_000)
-    parser.add_argument("--workers", type=int, default=available_cores())
-    parser.add_argument("--json", type=Path, help="write every seed's figures here")
-    options = parser.parse_args()
+def reliability(options: argparse.Namespace, pool: Pool) -> list[dict[str, Any]]:
+    """Train and evaluate every seed, and print a line for each group."""
     print(
         f"{'':36s} {'backend':7s} {'seeds':>5s} {'last 2000':>16s} {'median':>7s} "
         f"{'greedy':>7s} {'worst':>7s} {'>=490':>6s} {'=500':>6s} {'CPU s':>7s}"
     )
     rows: list[dict[str, Any]] = []
+    for row in pool.imap(measure, make_jobs(options)):
+        rows.append(row)
+        group = [r for r in rows if (r["name"], r["backend"]) == (row["name"], row["backend"])]
+        if len(group) == options.seeds:
+            print_group(row["name"], row["backend"], group)
+    return rows
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("what", choices=["presets", "variants", "endless"])
+    parser.add_argument("--names", nargs="*", help="only these")
+    parser.add_argument("--backends", nargs="*", default=["mujoco"], choices=["mujoco", "gym"])
+    parser.add_argument("--seeds", type=int, default=20)
+    parser.add_argument("--first-seed", type=int, default=1_000)
+    parser.add_argument("--starts", type=int, default=1_000, help="a multiple of 50")
+    parser.add_argument("--steps", type=int, default=100_000)
+    parser.add_argument("--workers", type=int, default=available_cores())
+    parser.add_argument("--json", type=Path, help="write every seed's figures here")
+    options = parser.parse_args()
+    measured = endless if options.what == "endless" else reliability
     with multiprocessing.Pool(options.workers) as pool:
-        for row in pool.imap(measure, make_jobs(options)):
-            rows.append(row)
-            group = [r for r in rows if (r["name"], r["backend"]) == (row["name"], row["backend"])]
-            if len(group) == options.seeds:
-                print_group(row["name"], row["backend"], group)
+        rows = measured(options, pool)
     if options.json:
         options.json.write_text(json.dumps(rows, indent=1) + "\n")
 

@@ -44,8 +44,8 @@ class Parameters(Base):
 
     gamma: float = 0.99
     """Discount per step."""
-    tolerance: float = 1e-6
-    """Stop once no value changes by more than this …"""
+    tolerance: float = 0.01
+    """Stop once a sweep changes no value by more than this …"""
     sweeps: int = 10_000
     """… or after so many sweeps over all nodes."""
 
