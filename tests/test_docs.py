@@ -61,6 +61,7 @@ NOT_HERE = {
 
 SCALED = {
     r"(?<=benchmarks/learners.py)(.* --seeds) \d+": r"\1 1",
+    r"--starts \d+$": "--starts 50",
     r"^make bench$": "make bench ARGS=--quick",
     r"(?<=^python -m benchmarks.bench) (?=--json)": " --quick --only start ",
     r"(?<=--speed 0.25) (?=-o slow.webp)": " --size 160x120 ",
