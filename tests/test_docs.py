@@ -42,7 +42,7 @@ FAST = {
     "docs/performance.md": {"mjcartpole --help"},
     "docs/tasks.md": {"import math"},
     "docs/variants.md": {
-        "mjcartpole evaluate runs/tuned-mujoco-seed0 --set hinge.damping=0.2",
+        "mjcartpole evaluate runs/tuned-mujoco-seed0 --set hinge.damping=0.6",
         "mjcartpole model edit cartpole --set pole.length=1.5 -o mine.xml",
         "import gymnasium",
     },
@@ -85,9 +85,9 @@ ENDLESS = {
 
 PRINTED = {
     "tuned on mujoco: 1,000 episodes, seed 0": "make train",
-    "greedy evaluation on mujoco, runs/tuned-mujoco-seed0/model.xml with hinge.damping=0.2: "
+    "greedy evaluation on mujoco, runs/tuned-mujoco-seed0/model.xml with hinge.damping=0.6: "
     "100 episodes, seed 1000000": (
-        "mjcartpole evaluate runs/tuned-mujoco-seed0 --set hinge.damping=0.2"
+        "mjcartpole evaluate runs/tuned-mujoco-seed0 --set hinge.damping=0.6"
     ),
 }
 """Blocks that show what a command prints, by their first line; it comes before them."""
