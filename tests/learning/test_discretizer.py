@@ -114,6 +114,13 @@ def test_what_half_a_table_says_of_the_whole(bins):
         assert table[discretizer(values)].tolist() == expected.tolist()
 
 
+def test_a_tie_is_broken_in_the_mirror_as_it_is_here():
+    discretizer = Discretizer((3,), (-1.0,), (1.0,), mirror=True)
+    table = discretizer.unfolded(np.array([[1.0, 1.0], [2.0, 2.0], [np.nan, np.nan]]))
+    assert np.argmax(table, axis=1).tolist() == [0, 0, 1]
+    assert np.allclose(table, [[1.0, 1.0], [2.0, 2.0], [1.0, 1.0]], atol=1e-15, rtol=0)
+
+
 def test_a_grid_that_is_not_symmetric_has_no_mirror():
     assert Discretizer((2, 1), (-1.0, -1.0), (1.0, 3.0), mirror=True).n_rows == 2
     with pytest.raises(ConfigError, match=r"as long to the left as to the right; -1.0 to 3.0"):

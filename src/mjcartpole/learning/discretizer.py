@@ -150,11 +150,17 @@ class Discretizer:
     def unfolded(self, learned: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         """Return the values of both actions in all rows of one mirrored grid.
 
+        Of equal values the first is played, which is the second one in the mirror: where a learned
+        state has a tie, its first action is put ahead by the last digit.
+
         Args:
             learned: Shape (n_rows, 2); what is in the second half does not count.
         """
         half = self.n_rows // 2
-        return np.concatenate([learned[: self.n_rows - half], learned[:half][::-1, ::-1]])
+        values = learned[: self.n_rows - half].copy()
+        ties = values[:half, 0] == values[:half, 1]
+        values[:half, 1][ties] = np.nextafter(values[:half, 1][ties], -np.inf)
+        return np.concatenate([values, values[:half][::-1, ::-1]])
 
     def _check(self) -> None:
         if not len(self.bins) == len(self.low) == len(self.high):

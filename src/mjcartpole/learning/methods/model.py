@@ -17,7 +17,6 @@ from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from mjcartpole.learning.methods.action_values import (
     ExplorationParameters,
@@ -27,6 +26,7 @@ from mjcartpole.learning.methods.action_values import (
     act,
     draw_table,
     explore,
+    greedy_values,
 )
 from mjcartpole.learning.methods.experience import Trajectory, Transition
 from mjcartpole.learning.methods.parameters import numbers_class
@@ -37,9 +37,8 @@ from mjcartpole.learning.methods.transition_counts import (
     make_counts,
 )
 from mjcartpole.learning.tiles import Table
-from mjcartpole.task import N_ACTIONS
 
-__all__ = ["act"]
+__all__ = ["act", "greedy_values"]
 
 PlanAfter = Literal["episode", "failure"]
 """After which episodes values are computed: each, or those that the rules ended."""
@@ -117,15 +116,3 @@ def sweep(p: Any, memory: Memory) -> float:
         change = max(change, abs(value - q[pair]))
         q[pair] = value
     return change
-
-
-def greedy_values(memory: Memory) -> npt.NDArray[np.float64]:
-    """Return the table, shape (n_rows, 2), with the first of equal values a last digit ahead.
-
-    In a model two ways may be worth the same to the last digit, and where a mirrored state is
-    played its first action is the second.
-    """
-    values = np.array(memory.q_table).reshape(-1, N_ACTIONS)
-    ties = values[:, 0] == values[:, 1]
-    values[ties, 1] = np.nextafter(values[ties, 1], -np.inf)
-    return values
