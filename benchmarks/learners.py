@@ -127,7 +127,7 @@ def make_jobs(options: argparse.Namespace) -> list[Job]:
         for name in names
         for backend in options.backends
         # A preset for a model of its own is nothing for gymnasium's cart-pole.
-        if backend == "mujoco" or "model" not in table[name]
+        if backend == "mujoco" or not {"model", "set"} & table[name].keys()
         for seed in seeds
     ]
 
