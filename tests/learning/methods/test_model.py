@@ -56,13 +56,6 @@ def test_a_table_that_balances_is_left_as_it_is_where_that_is_asked_for(at_work)
     assert q.table == [[1.0, pytest.approx(2 / 1.1)], [3.0, 4.0]]
 
 
-def test_of_equal_values_the_first_is_better_in_a_mirrored_state_too(at_work):
-    q = at_work([[2.0, 2.0], [1.0, 3.0]], **MODEL)
-    greedy = q.greedy_values
-    assert greedy[0, 1] < greedy[0, 0] == 2.0
-    np.testing.assert_allclose(greedy, q.table, rtol=1e-15)
-
-
 def test_a_walk_has_the_values_of_its_shortest_way(at_work):
     q = at_work([[0.0, 0.0]] * 7, **MODEL | AT_RANDOM)
     q.play(Walk(7), 30)
