@@ -123,6 +123,14 @@ def pair_at(tiles: Any, q: Table, s: int) -> tuple[float, float]:
     return left, right
 
 
+def value_at(tiles: Any, q: Table, s: int, a: int) -> float:
+    """Return the value of one action in a state."""
+    if tiles is None:
+        return q[2 * s + a]
+    left, right = pair_at(tiles, q, s)
+    return right if a == 1 else left
+
+
 def add_at(tiles: Any, q: Table, s: int, a: int, change: float) -> None:
     """Change the value of an action in a state; each row takes its share."""
     if tiles is None:

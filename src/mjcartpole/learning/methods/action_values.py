@@ -11,7 +11,7 @@ from mjcartpole.learning.discretizer import is_finite
 from mjcartpole.learning.methods.experience import Trajectory
 from mjcartpole.learning.methods.parameters import Parameters
 from mjcartpole.learning.schedules import linear
-from mjcartpole.learning.tiles import Table, add_at, all_weights, pair_at
+from mjcartpole.learning.tiles import Table, add_at, all_weights, pair_at, value_at
 from mjcartpole.task import N_ACTIONS
 
 Ties = Literal["first", "random"]
@@ -180,7 +180,7 @@ def act(p: Any, memory: Any, rates: Rates, s: int, rng: np.random.Generator) -> 
 
 def value(p: Any, q: Table, s: int, a: int) -> float:
     """Return the value of an action in a state."""
-    return pair_at(p.tiles, q, s)[a]
+    return value_at(p.tiles, q, s, a)
 
 
 def better(p: Any, q: Table, s: int) -> int:
