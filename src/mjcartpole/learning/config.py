@@ -9,13 +9,13 @@ import functools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final, Self
+from typing import TYPE_CHECKING, Any, Final, Literal, Self
 
 from mjcartpole.envs.backend import Backend, check_backend
 from mjcartpole.errors import ConfigError, check_known
 from mjcartpole.integrator import Integrator
 from mjcartpole.learning.discretizer import Discretizer, is_finite
-from mjcartpole.learning.methods import method_named
+from mjcartpole.learning.methods import METHODS, method_named
 from mjcartpole.learning.methods.parameters import Parameters
 from mjcartpole.learning.presets import PRESETS
 from mjcartpole.task import (
@@ -267,7 +267,8 @@ def config_class(method: str) -> type[TrainConfig]:
     """
     made: type[TrainConfig] = dataclasses.make_dataclass(
         "TrainConfig",
-        [("method", str, dataclasses.field(default=method))],
+        # The command line names what a literal can be.
+        [("method", Literal[tuple(METHODS)], dataclasses.field(default=method))],
         bases=(method_named(method).Parameters, TrainConfig),
         namespace={
             "__doc__": TrainConfig.__doc__,
