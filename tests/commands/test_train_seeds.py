@@ -235,3 +235,12 @@ def test_seeds_and_workers_that_make_no_sense(flags, message, here, capsys):
     assert (code, out, err.count("\n")) == (2, "", 1)
     assert message in err
     assert not Path("many").exists()
+
+
+@pytest.mark.parametrize("seeds", [1, 3])
+def test_what_cannot_be_mirrored_is_one_line_and_no_folder(seeds, here, capsys):
+    code, out, err = call(["train", "--model", "wind", "--mirror", "--seeds", str(seeds)], capsys)
+    assert (code, out) == (2, "")
+    assert "wind does not: pushed to the right" in err
+    assert err.count("\n") == 1
+    assert not list(here.iterdir())

@@ -12,6 +12,7 @@ from mjcartpole.learning.documents import CONFIG
 from mjcartpole.learning.naming import in_flags, namesakes
 from mjcartpole.learning.run_model import check_storable
 from mjcartpole.learning.session import check_interval
+from mjcartpole.learning.training import training_grid
 from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.playable import why_unplayable
 from mjcartpole.physics.simulation import silence_mujoco
@@ -25,7 +26,7 @@ def prepare(config: TrainConfig, how: TrainOptions) -> CartPole:
     """
     check(how)
     cartpole = config.load_model()
-    config.discretizer(cartpole.poles)
+    training_grid(config, cartpole)
     check_storable(cartpole)
     why = why_unplayable(cartpole, config.integrator) if config.backend == "mujoco" else None
     if why:

@@ -208,7 +208,7 @@ class TrainConfig:
                     f"give {_DIMENSIONS}{also} ({', '.join(state_names(poles))})"
                 )
         bins, low, high = (_for_each_pole(getattr(self, name), poles) for name in _GRID)
-        tilings = self.values().get("tilings", 1)
+        tilings = getattr(self, "tilings", 1)
         return Discretizer(bins, low, high, bool(self.mirror), tilings, self.interpolated)
 
     @property

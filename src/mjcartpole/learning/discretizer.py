@@ -170,6 +170,10 @@ class Discretizer:
             )
         if not all(type(n) is int and n >= 1 for n in self.bins):
             raise ConfigError(f"bins must be whole numbers from 1 up, not {self.bins}")
+        self._check_ranges()
+        self._check_size()
+
+    def _check_ranges(self) -> None:
         for n, low, high in zip(self.bins, self.low, self.high, strict=True):
             if not (is_finite(low) and is_finite(high) and low < high):
                 raise ConfigError(
@@ -183,6 +187,8 @@ class Discretizer:
                     "mirror needs ranges that are as long to the left as to the right; "
                     f"{low!r} to {high!r} is not"
                 )
+
+    def _check_size(self) -> None:
         if self.tilings not in TILINGS:
             known = ", ".join(map(str, TILINGS))
             raise ConfigError(f"tilings must be one of {known}, not {self.tilings!r}")

@@ -10,12 +10,16 @@ import numpy as np
 
 from mjcartpole.errors import ConfigError
 from mjcartpole.files import atomic_write
+from mjcartpole.learning.discretizer import Discretizer
 from mjcartpole.learning.learner import Learner
 from mjcartpole.learning.training import TrainResult
 
 NAME: Final = "events.out.tfevents.0.mjcartpole"
 POINTS: Final = 10_000
 """The most points of a curve; longer trainings are drawn as means of blocks."""
+
+_ONE_STATE: Final = Discretizer((1,), (-1.0,), (1.0,))
+"""No rates depend on what is learned, so there need be no table."""
 
 
 def check_installed() -> None:
@@ -55,7 +59,7 @@ def write_events(folder: Path, result: TrainResult) -> None:
 
 def _points(result: TrainResult) -> Iterator[tuple[int, dict[str, float]]]:
     """Yield numbers of episodes, with values by the names of their curves."""
-    learner, returns = Learner(result.config, result.policy.discretizer), result.returns
+    learner, returns = Learner(result.config, _ONE_STATE), result.returns
     begin_episode = learner.method.begin_episode
     for block in np.array_split(np.arange(len(returns)), min(POINTS, max(len(returns), 1))):
         if block.size:

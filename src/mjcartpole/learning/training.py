@@ -134,7 +134,7 @@ class Training:
             cartpole = None
         elif cartpole is None and env is None:
             cartpole = config.load_model()
-        self.discretizer = _discretizer(config, cartpole, env)
+        self.discretizer = training_grid(config, cartpole, env)
         self.learner = Learner(config, self.discretizer)
         if env is not None and self.learner.plans:
             raise ConfigError(
@@ -289,10 +289,20 @@ def train(config: TrainConfig | None = None, *, engine: Engine = "compiled") -> 
     return training.result()
 
 
-def _discretizer(
-    config: TrainConfig, cartpole: CartPole | None, env: gymnasium.Env[Any, Any] | None
+def training_grid(
+    config: TrainConfig, cartpole: CartPole | None, env: gymnasium.Env[Any, Any] | None = None
 ) -> Discretizer:
-    """Return the grid, mirrored if that is asked for, or left open where all is symmetric."""
+    """Return the grid of a training, mirrored if that is asked for, or open and all is symmetric.
+
+    Args:
+        config: What is trained.
+        cartpole: Its model; backend gym has its own.
+        env: An environment of one's own, of which nothing is known.
+
+    Raises:
+        ConfigError: It is for another number of poles, or what is to be mirrored is not symmetric.
+    """
+    cartpole = None if config.backend == "gym" else cartpole
     grid = config.discretizer(_count_poles(cartpole, env))
     if config.mirror is False or (config.mirror is None and env is not None):
         return grid

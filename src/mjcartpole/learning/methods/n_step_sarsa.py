@@ -15,7 +15,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mjcartpole.errors import ConfigError
 from mjcartpole.learning.methods.action_values import (
     FloatMemory,
     IntMemory,
@@ -54,10 +53,7 @@ class Parameters(TiledParameters):
             ConfigError: See above.
         """
         super().check_parameters()
-        if type(self.n_steps) is not int or not 1 <= self.n_steps <= MOST_STEPS:
-            raise ConfigError(
-                f"n_steps must be a whole number from 1 to {MOST_STEPS:,}, not {self.n_steps!r}"
-            )
+        self._check_whole("n_steps", 1, MOST_STEPS)
 
 
 Numbers = numbers_class(Parameters, __name__)

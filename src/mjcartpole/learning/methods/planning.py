@@ -19,6 +19,7 @@ import numpy.typing as npt
 from mjcartpole.errors import ConfigError
 from mjcartpole.learning.discretizer import Discretizer
 from mjcartpole.learning.methods.action_values import (
+    DiscountParameters,
     QTable,
     Rates,
     better,
@@ -26,7 +27,6 @@ from mjcartpole.learning.methods.action_values import (
     learn_no_more,
 )
 from mjcartpole.learning.methods.experience import Dynamics, Transition, Vector
-from mjcartpole.learning.methods.parameters import Parameters as Base
 from mjcartpole.learning.methods.parameters import numbers_class
 from mjcartpole.task import N_ACTIONS
 
@@ -37,7 +37,7 @@ MOST_WEIGHTS = 2**25
 
 
 @dataclass(frozen=True, kw_only=True)
-class Parameters(Base):
+class Parameters(DiscountParameters):
     """Discount, and when to stop."""
 
     interpolated: ClassVar[bool] = True
@@ -55,7 +55,7 @@ class Parameters(Base):
         Raises:
             ConfigError: See above.
         """
-        self._check_shares("gamma")
+        super().check_parameters()
         self._check_positive("tolerance")
         self._check_whole("sweeps", 1)
 

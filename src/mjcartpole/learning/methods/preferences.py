@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from mjcartpole.errors import ConfigError
 from mjcartpole.learning.discretizer import is_finite
-from mjcartpole.learning.methods.parameters import Parameters
+from mjcartpole.learning.methods.action_values import StepSizeParameters
 from mjcartpole.learning.schedules import linear
 from mjcartpole.learning.tiles import Table
 from mjcartpole.task import N_ACTIONS
@@ -33,11 +33,9 @@ class Rates(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True)
-class PreferenceParameters(Parameters):
+class PreferenceParameters(StepSizeParameters):
     """Discount, step sizes, and the first values; at first both actions are equally likely."""
 
-    gamma: float = 0.98
-    """Discount per step."""
     alpha: float = 0.01
     """Step size of the preferences at the start."""
     alpha_final: float = 0.01
@@ -57,8 +55,8 @@ class PreferenceParameters(Parameters):
         Raises:
             ConfigError: See above.
         """
-        self._check_shares("gamma", "alpha", "alpha_final", "alpha_values", "alpha_values_final")
-        self._check_shares("decay")
+        super().check_parameters()
+        self._check_shares("alpha_values", "alpha_values_final", "decay")
         if not is_finite(self.v_init):
             raise ConfigError(f"v_init must be a finite number, not {self.v_init!r}")
 

@@ -25,10 +25,10 @@ from mjcartpole.learning.methods.action_values import (
     best,
     draw_table,
     explore,
+    greedy_values,
     learn_no_more,
 )
 from mjcartpole.learning.methods.experience import Transition
-from mjcartpole.learning.methods.model import greedy_values
 from mjcartpole.learning.methods.parameters import numbers_class
 from mjcartpole.learning.methods.priority_queue import make_queue, pop, push
 from mjcartpole.learning.methods.transition_counts import (
