@@ -50,6 +50,11 @@ def test_an_unknown_name_is_told_with_those_there_are(name):
     assert str(caught.value) == f"task {name!r} is unknown; available: one, two"
 
 
+def test_the_nearest_name_is_told():
+    with pytest.raises(ConfigError, match=r"available: one, three; did you mean 'three'\?$"):
+        check_known("task", "thre", ("one", "three"))
+
+
 def test_an_unknown_name_is_the_error_that_was_asked_for():
     with pytest.raises(RenderError, match="rung 7 is unknown; available: 1, 2"):
         check_known("rung", 7, (1, 2), RenderError)

@@ -113,10 +113,17 @@ def parse(argv: Sequence[str]) -> Command:
     except SystemExit as stop:
         if not stop.code:
             raise
-        known = argv[0] in map(name_of, COMMANDS)
-        see = f"see mjcartpole {argv[0]} --help" if known else "see mjcartpole --help"
-        raise UsageError(f"{_one_line(complaint.getvalue())}; {see}") from None
+        raise UsageError(_explained(words, complaint.getvalue())) from None
     return command
+
+
+def _explained(words: list[str], complaint: str) -> str:
+    """Return in one line why a command line was not understood, and where help is."""
+    named = [command for command in COMMANDS if name_of(command) == words[0]]
+    for command in named:
+        if said := command.explain(words):
+            return said
+    return f"{_one_line(complaint)}; see mjcartpole {f'{words[0]} ' if named else ''}--help"
 
 
 def _one_line(complaint: str) -> str:

@@ -21,6 +21,7 @@
 A message says what was asked, what was found, what is available and the next step, in one line.
 """
 
+import difflib
 from collections.abc import Iterable
 
 
@@ -107,5 +108,18 @@ def check_known(
         error: What is raised; a `ConfigError` unless it says otherwise.
     """
     names = list(available)
-    if name not in names:
-        raise error(f"{kind} {name!r} is unknown; available: {', '.join(map(str, names))}")
+    if name in names:
+        return
+    hint = "".join(f"; did you mean {near!r}?" for near in nearest(name, names)[:1])
+    raise error(f"{kind} {name!r} is unknown; available: {', '.join(map(str, names))}{hint}")
+
+
+def nearest(name: object, available: Iterable[object]) -> list[str]:
+    """Return the names that somebody may have meant, the likeliest first.
+
+    >>> nearest("n-step", ("sarsa", "n-step-sarsa"))
+    ['n-step-sarsa']
+    """
+    names = [str(each) for each in available]
+    meant = name if isinstance(name, str) else ""
+    return difflib.get_close_matches(meant, names, n=max(1, len(names)))

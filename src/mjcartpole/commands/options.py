@@ -51,6 +51,11 @@ class Command:
         """
         return None
 
+    @classmethod
+    def explain(cls, words: Sequence[str]) -> str | None:
+        """Return what is wrong with a command line that was not understood; None: tyro says it."""
+        return None
+
     def run(self) -> int:
         """Do it, and return the exit code.
 

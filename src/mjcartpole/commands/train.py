@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Self
 
+from mjcartpole.commands.method_flags import lacking
 from mjcartpole.commands.options import Command, Included
 from mjcartpole.commands.train_options import RunLocation, TrainOptions
 from mjcartpole.commands.words import value_of
@@ -31,6 +32,16 @@ class Train(Command):
         preset = value_of("--preset", words, RunLocation.preset)
         method = value_of("--method", words, TrainConfig.preset(preset).method)
         return cls(RunLocation(preset), config=TrainConfig.preset(preset, method=method))
+
+    @classmethod
+    def explain(cls, words: Sequence[str]) -> str | None:
+        """Return which option the method lacks, and what it has."""
+        groups = (cls, RunLocation, TrainOptions, TrainConfig)
+        others = [each.name for group in groups for each in dataclasses.fields(group)]
+        said = lacking(words, cls.default(words).config.method, others)
+        if said and value_of("--resume", words, ""):
+            return f"--resume continues a run as it began: leave out what only trains; {said}"
+        return said
 
     def run(self) -> int:
         """Train one seed, many of them, or go on with either."""

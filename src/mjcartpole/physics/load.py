@@ -5,7 +5,6 @@ that pushes along the slider. Names do not matter; structure does.
 """
 
 import dataclasses
-import difflib
 import functools
 import os
 from collections.abc import Iterator, Mapping, Sequence
@@ -15,7 +14,13 @@ from typing import Final, TypeAlias
 import mujoco
 import numpy as np
 
-from mjcartpole.errors import ConfigError, ModelNotFoundError, ModelSyntaxError, NotACartPoleError
+from mjcartpole.errors import (
+    ConfigError,
+    ModelNotFoundError,
+    ModelSyntaxError,
+    NotACartPoleError,
+    nearest,
+)
 from mjcartpole.physics.build import build, compile_text, find_parts
 from mjcartpole.physics.cartpole import CartPole, own_copy
 from mjcartpole.physics.edit.edits import edit_document, edits_of
@@ -200,8 +205,7 @@ def find_model(source: str | os.PathLike[str]) -> Path:
         if there.is_file():
             return there
     names = model_names()
-    close = difflib.get_close_matches(str(source), names, n=1)
-    hint = f", did you mean '{close[0]}'?" if close else ""
+    hint = "".join(f", did you mean '{near}'?" for near in nearest(str(source), names)[:1])
     raise ModelNotFoundError(
         f"no model is called '{source}'{hint}; available: {', '.join(names)} "
         "(or give the path of a file that ends in .xml)"

@@ -1,12 +1,13 @@
 """Which elements and attributes MJCF has, as MuJoCo itself says."""
 
-import difflib
 import functools
 import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
 import mujoco
+
+from mjcartpole.errors import nearest
 
 _LINE = re.compile(r"^( *)(\S+) \((.)\) +(.*)$")
 
@@ -103,8 +104,7 @@ def attributes_of(tag: str) -> list[str]:
 def did_you_mean(word: str, known: Iterable[str]) -> str:
     """Return the nearest of some words, or all where none is near, for the end of a message."""
     words = sorted(set(known))
-    near = difflib.get_close_matches(word, words, n=3, cutoff=0.6)
-    if near:
+    if near := nearest(word, words)[:3]:
         return "did you mean " + " or ".join(f"'{each}'" for each in near) + "?"
     shown = ", ".join(words[:40]) + (" …" if len(words) > 40 else "")
     return f"available: {shown or 'nothing'}"
