@@ -52,7 +52,7 @@ def test_an_unknown_name_is_told_with_those_there_are(name):
 
 def test_the_nearest_name_is_told():
     with pytest.raises(ConfigError, match=r"available: one, three; did you mean 'three'\?$"):
-        check_known("task", "thre", ("one", "three"))
+        check_known("task", "tree", ("one", "three"))
 
 
 def test_an_unknown_name_is_the_error_that_was_asked_for():
