@@ -1,5 +1,6 @@
 """A task that is written in a few lines trains, films and evaluates on both backends."""
 
+import json
 import math
 import subprocess
 import sys
@@ -16,6 +17,7 @@ from mjcartpole.envs.backend import make_env
 from mjcartpole.envs.registration import env_id
 from mjcartpole.errors import ConfigError
 from mjcartpole.learning.config import TrainConfig
+from mjcartpole.learning.documents import read_config
 from mjcartpole.learning.evaluation import evaluate
 from mjcartpole.learning.policy import Policy
 from mjcartpole.learning.training import train
@@ -163,6 +165,24 @@ def test_the_command_line_trains_films_and_evaluates_it(backend, tmp_path, monke
     assert figures.split("\n", 1)[1] in trained
     assert run("evaluate", "run", "--task", "CartPole-v1", "--json") == 0
     assert '"minimum": -' not in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_a_run_remembers_how_long_its_episodes_were(backend, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    words = ["train", "--backend", backend, "--episodes", "150", "--max-episode-steps", "30"]
+    assert run(*words, "--no-video", "--run-dir", "run") == 0
+    config = read_config(tmp_path / "run")[2]
+    assert train(config).returns.max() == 30
+    capsys.readouterr()
+    for words, most in ((), 30), (["--max-episode-steps", "20"], 20):
+        assert run("evaluate", "run", "--json", *words) == 0
+        assert json.loads(capsys.readouterr().out)["mean"] <= most
+    longer = ["--task", "CartPole-v1", "--max-episode-steps", "31"]
+    assert run("evaluate", "run", "--json", *longer) == 0
+    assert json.loads(capsys.readouterr().out)["endings"]["time limit"] > 0
+    assert run("evaluate", "run", "--max-episode-steps", "0") == 2
+    assert "max_episode_steps must be a whole number from 1" in capsys.readouterr().err
 
 
 AT_EXIT = """

@@ -1,5 +1,6 @@
 """Tasks: CartPole-v1's rules on both sides of every limit, and rules that make no sense."""
 
+import dataclasses
 import math
 
 import gymnasium
@@ -62,6 +63,21 @@ def test_numbers_are_gymnasiums():
 )
 def test_the_most_that_an_episode_returns(task, most):
     assert task.most_return == most
+
+
+def test_episodes_of_another_length_are_solved_by_as_large_a_share_of_them():
+    assert CARTPOLE_V1.with_time_limit(None) is CARTPOLE_V1.with_time_limit(500) is CARTPOLE_V1
+    short, other = (task.with_time_limit(100) for task in (CARTPOLE_V1, Task("none agreed")))
+    assert (short.time_limit, short.reward_threshold, short.x_limit) == (100, 95.0, X)
+    assert (other.time_limit, other.reward_threshold) == (100, None)
+    punished = dataclasses.replace(CARTPOLE_V1.with_sutton_barto_reward(), reward_threshold=-0.1)
+    assert punished.with_time_limit(7).reward_threshold is None
+
+
+@pytest.mark.parametrize("steps", [0, -1, 2.5, True, 10**7 + 1])
+def test_episodes_that_have_no_length_are_refused(steps):
+    with pytest.raises(ConfigError, match="from 1 to 10,000,000, not"):
+        CARTPOLE_V1.with_time_limit(steps)
 
 
 @pytest.mark.parametrize(("terminated", "sutton_barto"), [(False, 0.0), (True, -1.0)])

@@ -19,6 +19,9 @@ from mjcartpole.errors import ConfigError, check_known
 CONTROL_STEP: Final = 0.02
 """Seconds between two actions."""
 
+MOST_STEPS: Final = 10_000_000
+"""Of one episode: two days and a half."""
+
 Reward: TypeAlias = Callable[[float, float, float, float, bool], float]
 """From the state after a step (x, x_dot, theta, theta_dot; m, m/s, rad, rad/s) and whether it ends
 the episode by the rules. Of several poles, theta and theta_dot are those of largest size. A plain
@@ -112,6 +115,28 @@ class Task:
         """
         angle = [self.theta_limit * 2, np.inf]
         return np.array([self.x_limit * 2, np.inf, *angle * poles], dtype=np.float32)
+
+    def with_time_limit(self, steps: int | None) -> "Task":
+        """Return the same task with episodes of so many control steps; None leaves it as it is.
+
+        At 1 per step as large a share of them counts as solved; of other rewards nothing is agreed.
+
+        >>> CARTPOLE_V1.with_time_limit(1_000).reward_threshold
+        950.0
+
+        Raises:
+            ConfigError: There are no such episodes.
+        """
+        if steps is None or steps == self.time_limit:
+            return self
+        if type(steps) is not int or not 1 <= steps <= MOST_STEPS:
+            raise ConfigError(
+                f"max_episode_steps must be a whole number from 1 to {MOST_STEPS:,}, not {steps!r}"
+            )
+        share = None
+        if self.reward is one_per_step and self.reward_threshold is not None:
+            share = self.reward_threshold / self.time_limit * steps
+        return dataclasses.replace(self, time_limit=steps, reward_threshold=share)
 
     def with_sutton_barto_reward(self) -> "Task":
         """Return the same task with 0 per step and -1 at the end."""

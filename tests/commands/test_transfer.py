@@ -222,8 +222,10 @@ def test_the_rules_are_the_policies_own_unless_others_are_asked_for(policies, tm
     assert returns([folder]) <= 40
     assert returns(policies[:1]) > 40
     assert returns(policies[:1], task=narrow.name) <= 40
-    with pytest.raises(ConfigError, match=r"Narrow-test-v0 and CartPole-v1; say by --task"):
+    said = r"Narrow-test-v0 \(40 steps\) and CartPole-v1 \(500 steps\); say by --task"
+    with pytest.raises(ConfigError, match=said):
         returns([folder, policies[0]])
+    assert returns(policies[:1], max_episode_steps=12) <= 12
     assert returns([folder, policies[0]], task="CartPole-v1") > 0
     with pytest.raises(ConfigError, match="task 'nothing'"):
         returns(policies[:1], task="nothing")

@@ -152,7 +152,8 @@ def test_a_checkpoint_of_a_config_without_what_came_later_is_read(content, scrat
     """Version 0.1 wrote such, with a table of two columns."""
     archive = dict(np.load(io.BytesIO(content[len(HEAD) + 65 :])))
     about = json.loads(archive["about"].tobytes())
-    for name in ("task", "method", "mirror", "tilings", "evaluate_every", "until"):
+    later = ("task", "method", "mirror", "tilings", "evaluate_every", "until", "max_episode_steps")
+    for name in later:
         del about["config"][name]
     archive["about"] = np.frombuffer(json.dumps(about).encode(), np.uint8)
     archive["q_table"] = archive["q_table"].reshape(-1, 2)

@@ -64,6 +64,8 @@ def test_presets_name_fields_only(name):
             {"until": 500.5},
             "at most 500, the most that an episode of CartPole-v1 returns, not 500.5",
         ),
+        ({"max_episode_steps": 0}, "max_episode_steps must be a whole number from 1"),
+        ({"max_episode_steps": 99, "until": 100}, "at most 99, the most that an episode"),
         ({"until": math.nan}, "until must be a number .* not nan"),
         ({"until": -math.inf}, "until must be a number .* not -inf"),
         ({"until": "475"}, "until must be a number"),
@@ -101,6 +103,7 @@ def test_values_that_make_no_sense(changes, message):
         ({"until": 300, "episodes": 60}, 1, 300),
         ({"until": 500, "evaluate_every": 7}, 7, 500),
         ({"evaluate_every": 2_000}, 2_000, 475),
+        ({"max_episode_steps": 1_000}, None, 950),
     ],
 )
 def test_when_a_training_is_evaluated_and_what_counts_as_solved(changes, period, solved_at):

@@ -103,6 +103,7 @@ def configs(draw):
         backend=physics[0],
         integrator=physics[1],
         episodes=draw(st.integers(1, 40)),
+        max_episode_steps=draw(st.none() | st.integers(1, 60)),
         seed=draw(st.integers(0, 9) | st.integers(0, 2**70)),
         bins=draw(st.tuples(*[st.sampled_from([1, 1, 2, 3, 8]) | st.integers(1, 14)] * 4)),
         # For each number of axes tiles are compiled anew.

@@ -86,3 +86,5 @@ class EvalTarget:
     """Folders in which the meshes and textures of a run's model may lie, besides the run's own."""
     task: str | None = None
     """The rules: limits, starting states, reward, time limit; the run's own if left out."""
+    max_episode_steps: int | None = None
+    """Control steps until an episode is truncated; the rules' own if left out."""

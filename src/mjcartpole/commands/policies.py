@@ -32,7 +32,10 @@ def set_up(source: Path, target: EvalTarget) -> PolicySetup:
     own_model = str(run.model) if run else config.model
     if backend == "gym":
         # Gymnasium's cart-pole has neither; only what the user asks for is held against that.
-        config, own_model = TrainConfig(backend="gym", task=config.task), "cartpole"
+        own_model = "cartpole"
+        config = TrainConfig(
+            backend="gym", task=config.task, max_episode_steps=config.max_episode_steps
+        )
     model, integrator = target.model or own_model, target.integrator or config.integrator
     check_backend(backend, model, integrator, target.set, own_timestep=target.own_timestep)
     own_timestep = config.own_timestep or target.own_timestep
@@ -41,7 +44,8 @@ def set_up(source: Path, target: EvalTarget) -> PolicySetup:
         played_on = run.cartpole(target.allow_assets, own_timestep=own_timestep)
     if target.set or (own_timestep and played_on == model):
         played_on = load_model(played_on, target.set, own_timestep=own_timestep)
-    rules = task_named(target.task or config.task)
+    rules = task_named(target.task) if target.task else config.rules
+    rules = rules.with_time_limit(target.max_episode_steps)
     return PolicySetup(name, policy, backend, played_on, integrator, seed, rules)
 
 

@@ -1,5 +1,6 @@
 """`mjcartpole transfer`."""
 
+import dataclasses
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -15,6 +16,7 @@ from mjcartpole.learning.policy import Policy
 
 if TYPE_CHECKING:
     from mjcartpole.studies.film import PolicySetup
+    from mjcartpole.task import Task
 
 PolicyGroups = Mapping[str, Sequence[Policy]]
 
@@ -37,6 +39,8 @@ class Transfer(Command):
     """Let a control step be one physics step of a model's file, instead of 0.02 s."""
     task: str | None = None
     """The rules: limits, starting states, reward, time limit; the policies' own if left out."""
+    max_episode_steps: int | None = None
+    """Control steps until an episode is truncated; the rules' own if left out."""
     episodes: int = EPISODES
     """Greedy episodes of each policy on each model."""
     seed: int = SEED
@@ -107,15 +111,16 @@ class Transfer(Command):
         settings = {"episodes": self.episodes, "seed": self.seed, "workers": self.workers}
         return {"task": self._task(), **settings}
 
-    def _task(self) -> str:
+    def _task(self) -> "Task":
         """Return by whose rules is played: those asked for, or all that the policies know."""
-        names = dict.fromkeys(self._set_up(source).task.name for source in self.sources)
-        if self.task is None and len(names) > 1:
+        known = dict.fromkeys(self._set_up(source).task for source in self.sources)
+        if len(known) > 1:
+            names = " and ".join(f"{task.name} ({task.time_limit:,} steps)" for task in known)
             raise ConfigError(
-                f"the policies were trained by the rules of {' and '.join(names)}; say by --task "
-                "which are played, so that their returns can be compared"
+                f"the policies were trained by the rules of {names}; say by --task and "
+                "--max-episode-steps which are played, so that their returns can be compared"
             )
-        return self.task or next(iter(names))
+        return next(iter(known))
 
     def _set_up(self, source: Path) -> "PolicySetup":
         """Return where a policy was trained; of many seeds the first."""
@@ -124,7 +129,8 @@ class Transfer(Command):
 
         if is_seeds(source):
             source = next(iter(learned_seeds(source)[0].values()))
-        return set_up(source, EvalTarget(allow_assets=self.allow_assets))
+        rules = EvalTarget(task=self.task, max_episode_steps=self.max_episode_steps)
+        return set_up(source, dataclasses.replace(rules, allow_assets=self.allow_assets))
 
     def _find_policies(self) -> PolicyGroups:
         """Return policies by name, of many seeds all under one; those of one name by paths."""

@@ -70,6 +70,8 @@ class TrainConfig:
     """gym: explicit Euler, as CartPole-v1; mujoco: the integrator that the model's file names."""
     task: str = CARTPOLE_V1.name
     """The rules: limits, starting states, reward, time limit."""
+    max_episode_steps: int | None = None
+    """Control steps until an episode is truncated; the task's own, 500, if left out."""
     method: str = DEFAULT_METHOD
     """How the table learns; each method has parameters of its own."""
     episodes: int = 1_000
@@ -171,12 +173,12 @@ class TrainConfig:
 
     @property
     def rules(self) -> Task:
-        """The task itself.
+        """The task itself, with episodes of the length that was asked for.
 
         Raises:
-            ConfigError: There is none of that name.
+            ConfigError: There is none of that name, or none of that length.
         """
-        return task_named(self.task)
+        return task_named(self.task).with_time_limit(self.max_episode_steps)
 
     def load_model(self) -> "CartPole":
         """Load the model that the config names; for backend gym the reference, as it is drawn.

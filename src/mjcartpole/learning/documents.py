@@ -19,6 +19,7 @@ _ADDED: Final = {
     "evaluate_every": None,
     "until": None,
     "tilings": 1,
+    "max_episode_steps": None,
 }
 """Fields that configs of version 0.1 lack, and what they stood for."""
 _SUMMARY_FIELDS: Final[Fields] = {
