@@ -305,6 +305,18 @@ FORGED = {
 }
 
 
+@pytest.mark.parametrize("method", METHODS)
+def test_a_memory_that_no_training_has_is_refused_by_its_field(method, tmp_path):
+    config = TrainConfig(method=method, backend="gym", episodes=5)
+    save_checkpoint(tmp_path, found := checkpoint_after(2, config))
+    path, content = tmp_path / LATEST, (tmp_path / LATEST).read_bytes()
+    for name, array in found.snapshot.memory.items():
+        values = array.copy()
+        values[-1] = np.nan if array.dtype.kind == "f" else 2**60
+        path.write_bytes(forged(content, **{name: values}))
+        assert f"be understood: {name} has values that are not " in assert_refused(path, config)
+
+
 def npy(array):
     file = io.BytesIO()
     np.save(file, array)

@@ -125,8 +125,8 @@ def load_checkpoint(
     Raises:
         CheckpointError: It is not there, damaged, or of another training.
     """
-    memory = Learner(config, config.discretizer(poles)).memory
-    most = sum(array.nbytes for array in memory) + config.episodes * _EPISODE_BYTES + _FRAME
+    learner = Learner(config, config.discretizer(poles))
+    most = sum(array.nbytes for array in learner.memory) + config.episodes * _EPISODE_BYTES + _FRAME
     most += 8 * _most_numbers(config)
     with opened(path, most, refusal=CheckpointError) as file:
         if not (line := file.readline(_LINE_LENGTH)).startswith(_HEAD):
@@ -142,7 +142,7 @@ def load_checkpoint(
                 about = parse(_array(archive, "about", np.uint8, _FRAME).tobytes())
                 its = read_values(checked(about, _ABOUT)["config"])
                 _check_same(path, its, about["model"], config, document)
-                return Checkpoint(its, about["model"], _snapshot(archive, about, its, memory))
+                return Checkpoint(its, about["model"], _snapshot(archive, about, its, learner))
         except _NOT_UNDERSTOOD as error:
             reason = brief(error) or type(error).__name__
             raise CheckpointError(f"'{path}' cannot be understood: {reason}; {_INSTEAD}") from error
@@ -190,7 +190,7 @@ def _pack(checkpoint: Checkpoint) -> bytes:
 
 
 def _snapshot(
-    archive: zipfile.ZipFile, about: dict[str, Any], config: TrainConfig, memory: Any
+    archive: zipfile.ZipFile, about: dict[str, Any], config: TrainConfig, learner: Learner
 ) -> Snapshot:
     columns = Columns(
         _array(archive, "totals", np.float64, config.episodes),
@@ -199,8 +199,9 @@ def _snapshot(
     )
     found = {
         name: _array(archive, name, array.dtype, array.size).reshape(array.shape)
-        for name, array in memory._asdict().items()
+        for name, array in learner.memory._asdict().items()
     }
+    learner.check(found)
     seconds, curve = float(about["seconds"]), _evaluations(archive, config)
     snapshot = Snapshot(found, about["env_rng"], about["learner_rng"], columns, seconds, curve)
     _check_snapshot(snapshot, config.evaluation_period)
@@ -252,8 +253,6 @@ def _check_snapshot(snapshot: Snapshot, period: int | None) -> None:
         ValueError: See above.
     """
     totals, steps, endings = snapshot.columns
-    if not all(np.isfinite(array).all() for array in snapshot.memory.values()):
-        raise ValueError("a table with values that are not finite")
     if not len(totals) == len(steps) == len(endings):
         raise ValueError("columns of episodes that do not fit together")
     if not (np.isfinite(totals).all() and (steps > 0).all()):

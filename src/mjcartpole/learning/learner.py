@@ -9,6 +9,7 @@ from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.discretizer import Discretizer
 from mjcartpole.learning.methods import method_named
 from mjcartpole.learning.methods.experience import Dynamics
+from mjcartpole.learning.methods.limits import check_limits
 from mjcartpole.learning.methods.parameters import numbers_of
 from mjcartpole.learning.tiles import tiles_of
 
@@ -40,6 +41,17 @@ class Learner:
         self.memory = self.method.make_memory(self.p, discretizer.n_rows, self.rng)
         self.episodes = config.episodes
         self._discretizer = discretizer
+
+    def check(self, memory: dict[str, npt.NDArray[Any]]) -> None:
+        """Refuse a memory that no training can have come to.
+
+        Raises:
+            ValueError: See above; names the field.
+        """
+        found = type(self.memory)(**memory)
+        check_limits(found, self._discretizer)
+        if hasattr(self.method, "check_memory"):
+            self.method.check_memory(self.p, found)
 
     @property
     def plans(self) -> bool:

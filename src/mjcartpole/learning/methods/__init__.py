@@ -49,6 +49,10 @@ class Method(Protocol):
     """What a method has that learns before the first episode: from p, memory, the grid, and what
     a step does in any state. Others need not have it."""
 
+    check_memory: Callable[[Any, Any], None]
+    """What a method has whose memory could contradict itself: raises ValueError, and names the
+    field. What each field may hold stands in its type (see `limits`). Others need not have it."""
+
     def begin_episode(self, p: Any, memory: Any, number: int, episodes: int) -> Any:
         """Return a NamedTuple of what holds during one of so many episodes, counted from 0."""
 

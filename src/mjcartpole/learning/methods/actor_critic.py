@@ -19,8 +19,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mjcartpole.learning.methods.action_values import FloatMemory, IntMemory, learn_no_more
+from mjcartpole.learning.methods.action_values import FloatMemory, learn_no_more
 from mjcartpole.learning.methods.experience import Transition
+from mjcartpole.learning.methods.limits import NoSteps, NoTraces, States
 from mjcartpole.learning.methods.parameters import numbers_class
 from mjcartpole.learning.methods.preferences import (
     PreferenceParameters,
@@ -67,13 +68,13 @@ class Memory(NamedTuple):
 
     preferences: Table
     state_values: FloatMemory
-    value_traces: FloatMemory
+    value_traces: NoTraces
     """Shape (n_rows,); so the next."""
-    policy_traces: FloatMemory
+    policy_traces: NoTraces
     """Of action 1; of action 0 it is as much below zero, and none is larger than the value's."""
-    traced: IntMemory
+    traced: States
     """States that have a trace, the first ones of shape (n_rows,)."""
-    n_traced: IntMemory
+    n_traced: NoSteps
     """How many these are; shape (1,)."""
 
 

@@ -21,7 +21,6 @@ import numpy as np
 from mjcartpole.learning.methods.action_values import (
     ExplorationParameters,
     FloatMemory,
-    IntMemory,
     Rates,
     act,
     draw_table,
@@ -29,9 +28,12 @@ from mjcartpole.learning.methods.action_values import (
     greedy_values,
 )
 from mjcartpole.learning.methods.experience import Trajectory, Transition
+from mjcartpole.learning.methods.limits import PairCounts, Pairs, StepCounts
 from mjcartpole.learning.methods.parameters import numbers_class
 from mjcartpole.learning.methods.transition_counts import (
     CountParameters,
+    StatesOrNothing,
+    check_counts,
     count,
     expected_value,
     make_counts,
@@ -69,18 +71,19 @@ class Parameters(CountParameters, ExplorationParameters):
 
 Numbers = numbers_class(Parameters, __name__)
 begin_episode = explore
+check_memory = check_counts
 
 
 class Memory(NamedTuple):
     """The table, and the counts, see `Counts`."""
 
     q_table: Table
-    visits: IntMemory
+    visits: StepCounts
     rewards: FloatMemory
-    successors: IntMemory
-    counts: IntMemory
-    seen: IntMemory
-    n_seen: IntMemory
+    successors: StatesOrNothing
+    counts: StepCounts
+    seen: Pairs
+    n_seen: PairCounts
 
 
 def make_memory(p: Any, n_rows: int, rng: np.random.Generator) -> Memory:

@@ -17,7 +17,6 @@ import numpy as np
 
 from mjcartpole.learning.methods.action_values import (
     FloatMemory,
-    IntMemory,
     Rates,
     TiledParameters,
     begin_episode,
@@ -29,6 +28,7 @@ from mjcartpole.learning.methods.action_values import (
     value,
 )
 from mjcartpole.learning.methods.experience import Transition
+from mjcartpole.learning.methods.limits import Actions, NoAction, NoSteps, States
 from mjcartpole.learning.methods.parameters import numbers_class
 from mjcartpole.learning.methods.sarsa import act
 from mjcartpole.learning.tiles import Table
@@ -64,13 +64,13 @@ class Memory(NamedTuple):
     """The table, the action that was drawn for the next step, and the last n steps."""
 
     q_table: Table
-    next_action: IntMemory
+    next_action: NoAction
     """Shape (1,); -1 at the start of an episode."""
-    steps_done: IntMemory
+    steps_done: NoSteps
     """Of the episode so far; shape (1,)."""
-    states: IntMemory
+    states: States
     """Of step t at t modulo n, shape (n_steps,); so the other two."""
-    actions: IntMemory
+    actions: Actions
     rewards: FloatMemory
 
 

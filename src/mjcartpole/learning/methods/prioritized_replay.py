@@ -20,7 +20,6 @@ import numpy as np
 
 from mjcartpole.learning.methods.action_values import (
     FloatMemory,
-    IntMemory,
     TiledParameters,
     act,
     best,
@@ -32,8 +31,15 @@ from mjcartpole.learning.methods.action_values import (
 )
 from mjcartpole.learning.methods.action_values import begin_episode as begin_rates
 from mjcartpole.learning.methods.experience import Transition
+from mjcartpole.learning.methods.limits import Actions, Flags, States, StepCounts
 from mjcartpole.learning.methods.parameters import numbers_class
-from mjcartpole.learning.methods.sum_tree import find_leaf, make_tree, set_leaf, weight_of
+from mjcartpole.learning.methods.sum_tree import (
+    check_tree,
+    find_leaf,
+    make_tree,
+    set_leaf,
+    weight_of,
+)
 from mjcartpole.learning.schedules import linear
 from mjcartpole.learning.tiles import Table
 
@@ -84,17 +90,17 @@ class Memory(NamedTuple):
     """The table, and the latest steps."""
 
     q_table: Table
-    states: IntMemory
+    states: States
     """Of the n-th step at n modulo the size of the memory; so the next four."""
-    actions: IntMemory
+    actions: Actions
     rewards: FloatMemory
-    next_states: IntMemory
-    terminated: IntMemory
+    next_states: States
+    terminated: Flags
     tree: FloatMemory
     """Of priorities to the power of omega, see `sum_tree`."""
     largest: FloatMemory
     """Of those, ever; shape (1,)."""
-    n_steps: IntMemory
+    n_steps: StepCounts
     """How many there were; shape (1,)."""
 
 
@@ -112,6 +118,16 @@ def make_memory(p: Any, n_rows: int, rng: np.random.Generator) -> Memory:
         largest=np.ones(1),
         n_steps=np.zeros(1, whole),
     )
+
+
+def check_memory(p: Any, memory: Memory) -> None:
+    """Refuse what no training can have come to.
+
+    Raises:
+        ValueError: See above.
+    """
+    known = min(memory.n_steps[0], p.replay_size)
+    check_tree("tree", np.asarray(memory.tree), known, memory.largest[0])
 
 
 def begin_episode(p: Any, memory: Any, number: int, episodes: int) -> ReplayRates:

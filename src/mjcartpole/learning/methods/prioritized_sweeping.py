@@ -19,7 +19,6 @@ import numpy as np
 from mjcartpole.learning.methods.action_values import (
     ExplorationParameters,
     FloatMemory,
-    IntMemory,
     Rates,
     act,
     best,
@@ -29,10 +28,18 @@ from mjcartpole.learning.methods.action_values import (
     learn_no_more,
 )
 from mjcartpole.learning.methods.experience import Transition
+from mjcartpole.learning.methods.limits import (
+    PairCounts,
+    Pairs,
+    StepCounts,
+    refuse,
+)
 from mjcartpole.learning.methods.parameters import numbers_class
-from mjcartpole.learning.methods.priority_queue import make_queue, pop, push
+from mjcartpole.learning.methods.priority_queue import check_queue, make_queue, pop, push
 from mjcartpole.learning.methods.transition_counts import (
     CountParameters,
+    StatesOrNothing,
+    check_counts,
     check_places,
     count,
     expected_value,
@@ -82,19 +89,19 @@ class Memory(NamedTuple):
     """The table, the counts, see `Counts`, the queue, see `Queue`, and what led where."""
 
     q_table: Table
-    visits: IntMemory
+    visits: StepCounts
     rewards: FloatMemory
-    successors: IntMemory
-    counts: IntMemory
-    seen: IntMemory
-    n_seen: IntMemory
-    heap: IntMemory
-    place: IntMemory
+    successors: StatesOrNothing
+    counts: StepCounts
+    seen: Pairs
+    n_seen: PairCounts
+    heap: Pairs
+    place: PairCounts
     priority: FloatMemory
-    n_queued: IntMemory
-    predecessors: IntMemory
+    n_queued: PairCounts
+    predecessors: Pairs
     """Lists of pairs, one for each row …"""
-    n_predecessors: IntMemory
+    n_predecessors: PairCounts
     """… and how many are in each; a full one takes no more."""
 
 
@@ -108,6 +115,21 @@ def make_memory(p: Any, n_rows: int, rng: np.random.Generator) -> Memory:
         np.zeros(n_rows * p.predecessors, np.int64),
         np.zeros(n_rows, np.int64),
     )
+
+
+def check_memory(p: Any, memory: Any) -> None:
+    """Refuse what no training can have come to.
+
+    Raises:
+        ValueError: See above.
+    """
+    check_counts(p, memory)
+    check_queue(memory)
+    n, lists = memory.n_predecessors, memory.predecessors.reshape(-1, p.predecessors)
+    refuse("n_predecessors", f"has more than the {p.predecessors} of a list", n > p.predecessors)
+    listed = lists[np.arange(p.predecessors) < n[:, None]]
+    for name, pairs in (("predecessors", listed), ("heap", memory.heap[: memory.n_queued[0]])):
+        refuse(name, "has what visits has not", memory.visits[pairs] == 0)
 
 
 def after_step(

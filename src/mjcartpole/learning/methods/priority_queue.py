@@ -7,19 +7,20 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mjcartpole.learning.methods.action_values import FloatMemory, IntMemory
+from mjcartpole.learning.methods.action_values import FloatMemory
+from mjcartpole.learning.methods.limits import PairCounts, Pairs, refuse
 
 
 class Queue(NamedTuple):
     """A queue."""
 
-    heap: IntMemory
+    heap: Pairs
     """Things; none is more urgent than the one at (k - 1) // 2 before it at k."""
-    place: IntMemory
+    place: PairCounts
     """Of each thing in the heap, counted from 1; 0 where it is not in it."""
     priority: FloatMemory
     """Of each thing that is in it."""
-    n_queued: IntMemory
+    n_queued: PairCounts
     """How many are, shape (1,)."""
 
 
@@ -27,6 +28,19 @@ def make_queue(n: int) -> Queue:
     """Return an empty queue for things 0 to n - 1."""
     heap, place, n_queued = (np.zeros(size, np.int64) for size in (n, n, 1))
     return Queue(heap, place, np.zeros(n), n_queued)
+
+
+def check_queue(memory: Any) -> None:
+    """Refuse a queue that contradicts itself.
+
+    Raises:
+        ValueError: See above.
+    """
+    waiting, places = memory.heap[: memory.n_queued[0]], np.arange(memory.n_queued[0])
+    refuse("place", "is not where things are in heap", memory.place[waiting] != places + 1)
+    refuse("place", "has things that wait nowhere", np.count_nonzero(memory.place) != len(waiting))
+    urgency = memory.priority[waiting]
+    refuse("priority", "is not in the order of heap", urgency[(places[1:] - 1) // 2] < urgency[1:])
 
 
 def push(memory: Any, thing: int, priority: float) -> None:

@@ -14,7 +14,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mjcartpole.learning.methods.action_values import (
-    IntMemory,
     Rates,
     TiledParameters,
     begin_episode,
@@ -26,6 +25,7 @@ from mjcartpole.learning.methods.action_values import (
     value,
 )
 from mjcartpole.learning.methods.experience import Transition
+from mjcartpole.learning.methods.limits import NoAction
 from mjcartpole.learning.methods.parameters import numbers_class
 from mjcartpole.learning.tiles import Table
 
@@ -45,7 +45,7 @@ class Memory(NamedTuple):
     """The table, and the action that was drawn for the next step."""
 
     q_table: Table
-    next_action: IntMemory
+    next_action: NoAction
     """Shape (1,); -1 at the start of an episode."""
 
 

@@ -8,11 +8,35 @@ import numpy as np
 import numpy.typing as npt
 
 from mjcartpole.learning.methods.action_values import FloatMemory
+from mjcartpole.learning.methods.limits import refuse
 
 
 def make_tree(leaves: int) -> npt.NDArray[np.float64]:
     """Return a tree of zeros with at least so many leaves."""
     return np.zeros(2 << (leaves - 1).bit_length())
+
+
+def check_tree(name: str, tree: npt.NDArray[np.float64], used: int, largest: float) -> None:
+    """Refuse a tree that contradicts itself.
+
+    Args:
+        name: What it is called.
+        tree: The tree.
+        used: Its first leaves, which have a weight; the others have none.
+        largest: No weight is above this.
+
+    Raises:
+        ValueError: See above.
+    """
+    half = len(tree) // 2
+    leaves, pairs = tree[half:], tree[2:].reshape(-1, 2)
+    weighty = (leaves > 0) & (leaves <= largest)
+    refuse(
+        name,
+        "has weights where there can be none",
+        (weighty != (np.arange(half) < used)) | (leaves < 0),
+    )
+    refuse(name, "has sums of something else", tree[1:half] != pairs.sum(axis=1))
 
 
 def set_leaf(tree: FloatMemory, leaf: int, weight: float) -> None:

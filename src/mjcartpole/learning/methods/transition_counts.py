@@ -8,13 +8,19 @@ the counts of a pair always add up to its visits.
 """
 
 from dataclasses import dataclass
-from typing import Any, Final, NamedTuple
+from typing import Annotated, Any, Final, NamedTuple
 
 import numpy as np
 
 from mjcartpole.errors import ConfigError
 from mjcartpole.learning.methods.action_values import FloatMemory, IntMemory, best
 from mjcartpole.learning.methods.experience import Transition
+from mjcartpole.learning.methods.limits import (
+    PairCounts,
+    Pairs,
+    StepCounts,
+    refuse,
+)
 from mjcartpole.learning.methods.parameters import Parameters
 from mjcartpole.task import N_ACTIONS
 
@@ -23,6 +29,9 @@ NOTHING: Final = -1
 
 MOST: Final = 4_000_000
 """Places in all lists together: 64 MB."""
+
+
+StatesOrNothing = Annotated[IntMemory, lambda grid: (NOTHING, grid.n_states - 1)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,16 +54,16 @@ class CountParameters(Parameters):
 class Counts(NamedTuple):
     """Counts; each pair has the place 2 s + a, and `successors` places in the lists."""
 
-    visits: IntMemory
+    visits: StepCounts
     rewards: FloatMemory
     """Sums."""
-    successors: IntMemory
+    successors: StatesOrNothing
     """Rows of states, or `NOTHING`."""
-    counts: IntMemory
+    counts: StepCounts
     """How often each was seen; a list ends at the first 0."""
-    seen: IntMemory
+    seen: Pairs
     """Pairs in the order in which they were first seen …"""
-    n_seen: IntMemory
+    n_seen: PairCounts
     """… and how many, shape (1,)."""
 
 
@@ -84,6 +93,22 @@ def check_places(n_rows: int, what: str, length: int, places: int) -> None:
             f"{n_rows:,} states with {length} {what} each make lists of {places:,} places; "
             f"the most is {MOST:,}: give fewer bins or {what}"
         )
+
+
+def check_counts(p: Any, memory: Any) -> None:
+    """Refuse counts that contradict each other.
+
+    Raises:
+        ValueError: See above.
+    """
+    visits, seen = memory.visits, memory.seen[: memory.n_seen[0]]
+    lists = memory.counts.reshape(-1, p.successors)
+    refuse("counts", "has a gap in a list", (lists[:, :-1] == 0) & (lists[:, 1:] > 0))
+    refuse(
+        "counts", "adds up to other sums than visits has", lists.sum(axis=1, dtype=float) != visits
+    )
+    visited = np.flatnonzero(visits)
+    refuse("seen", "is not what visits has", not np.array_equal(np.sort(seen), visited))
 
 
 def count(p: Any, memory: Any, step: Transition) -> None:
