@@ -7,11 +7,12 @@ CONSTRAINTS ?=
 BIN = $(VENV)/bin
 INSTALL = $(BIN)/python -m pip install --quiet --disable-pip-version-check $(CONSTRAINTS:%=--constraint %)
 
-.PHONY: help train test test-all coverage lint bench constraints clean
+.PHONY: help train page test test-all coverage lint bench constraints clean
 .DELETE_ON_ERROR:
 
 help:
 	@echo "make train     train a Q-table on MuJoCo, evaluate it, film it (ARGS=... for flags)"
+	@echo "make page      build what \`mjcartpole page\` puts into a page (needs Node.js)"
 	@echo "make test      lint, types and the fast tests"
 	@echo "make test-all  the same with the slow tests"
 	@echo "make coverage  the fast tests, and which lines they do not reach"
@@ -21,6 +22,11 @@ help:
 
 train: $(VENV)/installed
 	@$(BIN)/mjcartpole train --backend mujoco $(ARGS)
+
+# MuJoCo in the browser: TypeScript and npm packages become src/mjcartpole/page/assets.
+page:
+	@command -v npm >/dev/null || { echo "make page needs Node.js 20 or newer, with npm" >&2; exit 1; }
+	cd web && npm ci --silent && npm run --silent build
 
 test: lint
 	$(BIN)/python -m pytest -q -n auto -m "not slow"

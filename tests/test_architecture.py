@@ -29,6 +29,7 @@ LAYERS = [
     "envs",
     "learning",
     "studies",
+    "page",
 ]
 TOP = {
     "signals",

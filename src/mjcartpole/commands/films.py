@@ -161,7 +161,7 @@ def film_result(
     setup = PolicySetup(
         name, result.policy, config.backend, model, config.integrator, task=config.rules
     )
-    path = _own_film(folder, summary) or default_path([setup], ".mp4")
+    path = own_film(folder, summary) or default_path([setup], ".mp4")
     # Named before it is drawn: resumed after a kill, the training takes no second name.
     summary["video"] = str(path)
     runs.write_summary(folder, summary)
@@ -174,12 +174,12 @@ def film_result(
 def remove_film(folder: Path) -> None:
     """Remove the film of a run that is about to be replaced, if it is where training puts it."""
     with contextlib.suppress(RunError):
-        path = _own_film(folder, read_summary(folder))
+        path = own_film(folder, read_summary(folder))
         if path is not None:
             path.unlink(missing_ok=True)
 
 
-def _own_film(folder: Path, summary: Mapping[str, Any]) -> Path | None:
+def own_film(folder: Path, summary: Mapping[str, Any]) -> Path | None:
     """Return the film that a run's summary names, if a training of it may have written it."""
     shown, name = Path(str(summary.get("video", ""))), shortened(folder.resolve().name, MOST_NAME)
     own = re.fullmatch(re.escape(name) + r"(-\d+)?\.(mp4|gif)", shown.name)

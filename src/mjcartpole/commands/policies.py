@@ -4,6 +4,7 @@ import sys
 from pathlib import Path
 
 from mjcartpole.commands.options import EvalTarget
+from mjcartpole.commands.printing import counted
 from mjcartpole.envs.backend import check_backend
 from mjcartpole.errors import ConfigError, RunError
 from mjcartpole.files import is_file
@@ -96,3 +97,12 @@ def median_seed(folder: Path) -> tuple[Path, int]:
     means = {run: float(read_summary(run)["evaluation"]["mean"]) for run in complete}
     ranked = sorted(complete, key=means.__getitem__)
     return ranked[(len(ranked) - 1) // 2], len(ranked)
+
+
+def shown(source: Path) -> Path:
+    """Return what is shown of a source: of many seeds, the one in the middle, which is told."""
+    if not multi_seed_runs.is_seeds(source):
+        return source
+    folder, count = median_seed(source)
+    print(f"{folder}  (the median of {counted(count, 'seed')} by mean greedy return)", flush=True)
+    return folder

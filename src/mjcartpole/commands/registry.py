@@ -11,6 +11,7 @@ from mjcartpole.commands.doctor import Doctor
 from mjcartpole.commands.evaluate import Evaluate
 from mjcartpole.commands.model import Model
 from mjcartpole.commands.options import Command
+from mjcartpole.commands.page import Page
 from mjcartpole.commands.parity import Parity
 from mjcartpole.commands.render import Render
 from mjcartpole.commands.train import Train
@@ -21,6 +22,7 @@ COMMANDS: Final[list[type[Command]]] = [
     Train,
     Evaluate,
     Render,
+    Page,
     Parity,
     Doctor,
     Model,

@@ -12,7 +12,6 @@ from mjcartpole.commands.options import (
     Policies,
     UsageError,
 )
-from mjcartpole.commands.printing import counted
 from mjcartpole.errors import FileError, RenderError
 from mjcartpole.files import check_free, check_writable
 from mjcartpole.learning.evaluation import check_count
@@ -45,7 +44,7 @@ class Render(Command):
     def run(self) -> int:
         """Play, and film it; all is checked before anything is played."""
         from mjcartpole.commands.films import default_path, film, write_sheet
-        from mjcartpole.commands.policies import set_up
+        from mjcartpole.commands.policies import set_up, shown
         from mjcartpole.studies.film import play
 
         if not self.sources:
@@ -54,7 +53,7 @@ class Render(Command):
             )
         signals = StopSignals()
         with signals.caught():
-            setups = [set_up(_shown(source), self.target) for source in self.sources]
+            setups = [set_up(shown(source), self.target) for source in self.sources]
             suffix = ".png" if self.sheet else ".mp4"
             path = self.output or default_path(setups, suffix, self.overwrite)
             self._check(setups, path)
@@ -87,15 +86,3 @@ class Render(Command):
                 )
         if path.suffix.lower() != ".png":
             raise RenderError(f"a contact sheet is a .png, not '{path}'")
-
-
-def _shown(source: Path) -> Path:
-    """Return what is filmed of a source: of many seeds, the one in the middle, which is told."""
-    from mjcartpole.commands.policies import median_seed
-    from mjcartpole.studies.multi_seed_runs import is_seeds
-
-    if not is_seeds(source):
-        return source
-    folder, count = median_seed(source)
-    print(f"{folder}  (the median of {counted(count, 'seed')} by mean greedy return)", flush=True)
-    return folder

@@ -1,0 +1,107 @@
+"""The HTML file: one shell around what was built from web/, and the data of runs."""
+
+import hashlib
+import html
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+from mjcartpole.errors import ConfigError
+from mjcartpole.files import read_bytes
+from mjcartpole.page.run_data import in_base64
+from mjcartpole.versions import version_of
+
+ASSETS: Final = Path(__file__).parent / "assets"
+"""Where the build of web/ puts what it makes; in a wheel it is there."""
+
+_NAMES: Final = ("page.js", "style.css", "mujoco.wasm.gz")
+_MOST_BYTES: Final = 2**25
+
+_SHELL: Final = """<!doctype html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta http-equiv="Content-Security-Policy" content="{policy}">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<meta name="color-scheme" content="light dark">
+<meta name="referrer" content="no-referrer">
+<title>{title}</title>
+<style>{style}</style>
+</head>
+<body>
+<div id="app"><p class="loading">Starting MuJoCo …</p></div>
+<noscript>This page runs MuJoCo in the browser, which needs JavaScript.</noscript>
+<script type="application/json" id="data">{data}</script>
+<script type="application/octet-stream" id="wasm">{wasm}</script>
+<script>{script}</script>
+</body>
+</html>
+"""
+
+
+def page_html(runs: Sequence[Mapping[str, Any]], assets: Path = ASSETS) -> str:
+    """Return the page of runs, whole.
+
+    Nothing of a run is written as HTML but the title, escaped: the rest is JSON in which no `<` is
+    left. The page may run this very script, and WebAssembly, and may load nothing at all.
+
+    Args:
+        runs: What `run_data` returns of each.
+        assets: The folder of what was built.
+
+    Raises:
+        ConfigError: Nothing was built.
+    """
+    script, style, wasm = (_asset(assets, name) for name in _NAMES)
+    page = {
+        "version": version_of("mjcartpole") or "",
+        "mujoco": version_of("mujoco") or "",
+        "runs": runs,
+    }
+    names = ", ".join(str(run["name"]) for run in runs)
+    return _SHELL.format(
+        policy=_policy(script, style),
+        title=html.escape(f"{names} · mjcartpole"),
+        style=style.decode(),
+        data=json.dumps(page).replace("<", "\\u003c"),
+        wasm=in_base64(wasm),
+        script=script.decode(),
+    )
+
+
+def check_built(assets: Path = ASSETS) -> None:
+    """Refuse to go on where web/ was not built.
+
+    Raises:
+        ConfigError: See above.
+    """
+    if missing := [name for name in _NAMES if not (assets / name).is_file()]:
+        raise ConfigError(
+            f"what web/ builds is not in '{assets}' ({', '.join(missing)} missing); in a checkout "
+            "`make page` builds them, with Node.js 20 or newer; wheels bring them along"
+        )
+
+
+def _asset(assets: Path, name: str) -> bytes:
+    check_built(assets)
+    return read_bytes(assets / name, _MOST_BYTES)
+
+
+def _policy(script: bytes, style: bytes) -> str:
+    """Return the Content-Security-Policy that lets these two be and nothing else."""
+    return "; ".join(
+        [
+            "default-src 'none'",
+            f"script-src '{_digest(script)}' 'wasm-unsafe-eval'",
+            f"style-src '{_digest(style)}'",
+            "img-src data:",
+            "media-src data:",
+            "base-uri 'none'",
+            "form-action 'none'",
+        ]
+    )
+
+
+def _digest(content: bytes) -> str:
+    return f"sha256-{in_base64(hashlib.sha256(content).digest())}"
