@@ -34,6 +34,7 @@ const REPLACED = [
     };`,
   ],
   [
+    // biome-ignore lint/suspicious/noTemplateCurlyInString: it is theirs, to be replaced
     "throwBindingError(`${humanName} has unknown type ${getTypeName(rawType)}`);",
     `const called = getTypeName(rawType);
     if (called !== "N10emscripten11memory_viewIbEE") throwBindingError(humanName + " has unknown type " + called);
