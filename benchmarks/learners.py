@@ -2,6 +2,7 @@
 
     python benchmarks/learners.py presets --seeds 20 --backends mujoco gym
     python benchmarks/learners.py variants --seeds 20
+    python benchmarks/learners.py bins --seeds 40 --backends mujoco gym
     python benchmarks/learners.py endless --names planned --seeds 1 --starts 10000
 
 Each seed is trained alone, then its greedy policy plays 100 episodes from fresh starting states.
@@ -58,6 +59,14 @@ VARIANTS: dict[str, dict[str, Any]] = {
     "one step, bins 1,1,6,12": {**ONE_STEP, "bins": (1, 1, 6, 12)},
     "one step, bins 3,3,6,8": {**ONE_STEP, "bins": (3, 3, 6, 8)},
 }
+
+# The article's discretization analysis: bins of angle and of angular velocity.
+BINS: dict[str, dict[str, Any]] = {
+    f"{preset}, {bins} bins": {**PRESETS[preset], "bins": (1, 1, bins, bins)}
+    for preset in ("article", "article-terminal")
+    for bins in (10, 25, 50, 100)
+}
+TABLES = {"presets": PRESETS, "variants": VARIANTS, "bins": BINS, "endless": PRESETS}
 
 PART = 50  # starts that are played with one seed
 
@@ -119,7 +128,7 @@ def play_on(part: tuple[TrainConfig, Policy, int, int]) -> npt.NDArray[np.int64]
 
 def make_jobs(options: argparse.Namespace) -> list[Job]:
     """All trainings that were asked for."""
-    table = VARIANTS if options.what == "variants" else PRESETS
+    table = TABLES[options.what]
     names = options.names or list(table)
     seeds = range(options.first_seed, options.first_seed + options.seeds)
     return [
@@ -136,12 +145,14 @@ def print_group(name: str, backend: str, rows: list[dict[str, Any]]) -> None:
     """One line of the table."""
     last = np.array([row["last_2000"] for row in rows])
     greedy = np.array([row["greedy_mean"] for row in rows])
+    seconds = np.array([row["cpu_seconds"] for row in rows])
+    steps = np.array([row["steps"] for row in rows])
     print(
         f"{name:36s} {backend:7s} {len(rows):5d} "
         f"{last.mean():7.1f} ±{last.std(ddof=min(1, len(rows) - 1)):6.1f} {np.median(last):7.1f} "
         f"{greedy.mean():7.1f} {greedy.min():7.1f} "
         f"{(greedy >= 490).mean():6.0%} {(greedy == 500).mean():6.0%} "
-        f"{np.median([row['cpu_seconds'] for row in rows]):7.1f}",
+        f"{np.median(seconds):7.1f} {np.median(seconds / steps) * 1e9:7.0f}",
         flush=True,
     )
 
@@ -150,7 +161,7 @@ def reliability(options: argparse.Namespace, pool: Pool) -> list[dict[str, Any]]
     """Train and evaluate every seed, and print a line for each group."""
     print(
         f"{'':36s} {'backend':7s} {'seeds':>5s} {'last 2000':>16s} {'median':>7s} "
-        f"{'greedy':>7s} {'worst':>7s} {'>=490':>6s} {'=500':>6s} {'CPU s':>7s}"
+        f"{'greedy':>7s} {'worst':>7s} {'>=490':>6s} {'=500':>6s} {'CPU s':>7s} {'ns/step':>7s}"
     )
     rows: list[dict[str, Any]] = []
     for row in pool.imap(measure, make_jobs(options)):
@@ -164,7 +175,7 @@ def reliability(options: argparse.Namespace, pool: Pool) -> list[dict[str, Any]]
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("what", choices=["presets", "variants", "endless"])
+    parser.add_argument("what", choices=list(TABLES))
     parser.add_argument("--names", nargs="*", help="only these")
     parser.add_argument("--backends", nargs="*", default=["mujoco"], choices=["mujoco", "gym"])
     parser.add_argument("--seeds", type=int, default=20)
