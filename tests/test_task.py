@@ -40,7 +40,24 @@ def test_termination_is_strict(x, theta, over):
 def test_no_limits_end_nothing():
     free = Task("free", x_limit=UP, theta_limit=UP)
     assert not free.has_ended(1e300, -1e300)
-    assert (free.observation_bound() == np.inf).all()
+    np.testing.assert_array_equal(free.observation_bound(), np.float32([UP, UP, math.pi, UP]))
+
+
+@given(st.floats(-1e6, 1e6))
+def test_an_angle_counts_from_minus_pi_to_pi(theta):
+    there = task.wrapped(theta)
+    assert -math.pi <= there <= math.pi
+    assert math.cos(there) == pytest.approx(math.cos(theta), abs=1e-9)
+    if -math.pi <= theta < math.pi:
+        assert there == theta
+    states = np.array([[theta, theta, theta, theta, 3 * theta, theta]])
+    expected = [[theta, theta, there, theta, task.wrapped(3 * theta), theta]]
+    np.testing.assert_array_equal(task.wrap_angles(states), expected)
+
+
+def test_no_number_is_an_angle_as_little_as_before():
+    assert math.isnan(task.wrapped(math.nan))
+    assert math.isnan(task.wrapped(math.inf))
 
 
 def test_numbers_are_gymnasiums():

@@ -9,7 +9,7 @@ import dataclasses
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final, TypeAlias
+from typing import Final, TypeAlias, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -21,6 +21,8 @@ CONTROL_STEP: Final = 0.02
 
 MOST_STEPS: Final = 10_000_000
 """Of one episode: two days and a half."""
+
+_TURN: Final = 2 * math.pi
 
 Reward: TypeAlias = Callable[[float, float, float, float, bool], float]
 """From the state after a step (x, x_dot, theta, theta_dot; m, m/s, rad, rad/s) and whether it ends
@@ -40,6 +42,11 @@ def minus_one_at_the_end(
     return -1.0 if terminated else 0.0
 
 
+def upright(x: float, x_dot: float, theta: float, theta_dot: float, terminated: bool) -> float:
+    """Return 1 for a pole that stands, 0 for one that hangs: (1 + cos theta) / 2."""
+    return (1.0 + math.cos(theta)) / 2.0
+
+
 CONSTANT: Final[Mapping[Reward, float]] = {one_per_step: 1.0, minus_one_at_the_end: 0.0}
 """Rewards that are the same number for every step that ends nothing, and that number: what need
 not be called in hot paths."""
@@ -56,9 +63,12 @@ class Task:
         name: What it is called; `mjcartpole/<name>` is its id in gymnasium.
         x_limit: The cart's centre may be this far from the middle of the track, in metres;
             `math.inf` for a track that ends no episode.
-        theta_limit: The pole may lean this far, in radians; `math.inf` for any angle.
+        theta_limit: The pole may lean this far, in radians; `math.inf` for any angle, which then
+            counts from -pi to pi: in observations, for the reward and for the rules.
         start_low: Lower bound of each of the starting state's values, drawn uniformly.
         start_high: Upper bound.
+        start_angle: Where poles start, in radians: 0 upright, pi hanging; what is drawn is added. A
+            pole on another starts in line with it.
         reward: Reward of one control step.
         time_limit: Control steps until an episode is truncated.
         reward_threshold: Mean return at which it counts as solved; None where nothing is agreed.
@@ -69,6 +79,7 @@ class Task:
     theta_limit: float = 12 * 2 * math.pi / 360
     start_low: float = -0.05
     start_high: float = 0.05
+    start_angle: float = 0.0
     reward: Reward = one_per_step
     time_limit: int = 500
     reward_threshold: float | None = None
@@ -87,6 +98,7 @@ class Task:
             and self.theta_limit > 0,
             "start_low and start_high are finite, in this order": all(map(math.isfinite, bounds))
             and bounds[0] <= bounds[1],
+            "start_angle is finite": math.isfinite(self.start_angle),
             "time_limit is a whole number from 1": isinstance(self.time_limit, int)
             and self.time_limit >= 1,
             "reward is a function of numbers": callable(self.reward),
@@ -103,6 +115,11 @@ class Task:
         return abs(x) > self.x_limit or abs(theta) > self.theta_limit
 
     @property
+    def turns(self) -> bool:
+        """Whether a pole may turn right round."""
+        return math.isinf(self.theta_limit)
+
+    @property
     def most_return(self) -> float:
         """What no episode's return exceeds; infinite where the reward is one's own function."""
         return CONSTANT.get(self.reward, math.inf) * self.time_limit
@@ -111,9 +128,10 @@ class Task:
         """Return the upper bound of the observation, shape (2 + 2 poles,); the lower is minus that.
 
         Positions may be twice as large as the limits that end an episode, so that the observation
-        of the last step still lies inside; velocities are unbounded.
+        of the last step still lies inside; velocities are unbounded. Of a pole that may turn right
+        round it is pi.
         """
-        angle = [self.theta_limit * 2, np.inf]
+        angle = [math.pi if self.turns else self.theta_limit * 2, np.inf]
         return np.array([self.x_limit * 2, np.inf, *angle * poles], dtype=np.float32)
 
     def with_time_limit(self, steps: int | None) -> "Task":
@@ -161,7 +179,11 @@ def register(task: Task) -> Task:
     return task
 
 
+SWING_UP: Final = Task("SwingUp-v0", theta_limit=math.inf, start_angle=math.pi, reward=upright)
+"""A pole that hangs is to be swung up, and kept there."""
+
 register(CARTPOLE_V1)
+register(SWING_UP)
 
 
 def task_named(name: str) -> Task:
@@ -216,6 +238,21 @@ def max_abs(values: Sequence[float] | npt.NDArray[np.float64]) -> float:
         largest = max(largest, abs(value))
         total += value
     return largest + 0.0 * total
+
+
+Angles = TypeVar("Angles", float, npt.NDArray[np.float64])
+
+
+def wrapped(theta: Angles) -> Angles:
+    """Return an angle as it counts from -pi to pi; Numba compiles this as it is."""
+    return theta - _TURN * ((theta + math.pi) // _TURN)
+
+
+def wrap_angles(states: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """Return states whose angles count from -pi to pi, shape (..., 2 + 2 poles), a copy."""
+    turned = states.copy()
+    turned[..., 2::2] = wrapped(turned[..., 2::2])
+    return turned
 
 
 def worst_pole(state: Sequence[float]) -> tuple[float, float, float, float]:

@@ -32,10 +32,10 @@ state_values = st.floats() | st.sampled_from(
     ]
 )
 states = st.tuples(*[state_values] * 4)
-GYM = stepping.GymPhysics(-10.0, 10.0)
+GYM = stepping.GymPhysics(-10.0, 10.0, 0.0)
 TWO = Simulation(load_model("twopoles"))
-MEMORY = compiled._Memory.of(TWO)
-POLES = compiled._physics(TWO, MEMORY)
+MEMORY = compiled._Memory.of(TWO, task.CARTPOLE_V1)
+POLES = compiled._physics(TWO, MEMORY, task.CARTPOLE_V1)
 
 
 def bits(*values):
@@ -51,8 +51,8 @@ def begin(physics, rules, rng):
 
 
 @numba.njit
-def row(physics, state, grid):
-    return kernels._row_of(stepping.observe(physics, state), grid)
+def row(physics, rules, state, grid):
+    return kernels._row_of(stepping.observe(physics, rules, state), grid)
 
 
 RULES = compiled._rules(task.CARTPOLE_V1)
@@ -163,7 +163,7 @@ def test_several_poles_are_observed_as_they_are(state):
     grid = Discretizer((3,) * 6, (-2.0,) * 6, (2.0,) * 6)
     TWO.state = state
     seen = np.array(state).astype(np.float32).astype(np.float64)
-    assert row(POLES, (0.0,) * 4, compiled._arrays(grid.grid)) == grid(seen.tolist())
+    assert row(POLES, RULES, (0.0,) * 4, compiled._arrays(grid.grid)) == grid(seen.tolist())
 
 
 @pytest.mark.parametrize("values", [[], [0.0], [-3.0, 2.0], [2.0, -3.0], [1e-320, -1e308]])

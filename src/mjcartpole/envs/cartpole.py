@@ -19,10 +19,19 @@ from mjcartpole.errors import InvalidActionError, ResetNeededError
 from mjcartpole.integrator import Integrator
 from mjcartpole.media.renderer import DEFAULT_HEIGHT, DEFAULT_WIDTH
 from mjcartpole.media.scene import DEFAULT_CAMERA
+from mjcartpole.physics.bodies import starting_state
 from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.load import Edits, ModelLike, load_shared
-from mjcartpole.physics.simulation import FARTHEST_SANE, Simulation, State, as_one_pole, check_sane
-from mjcartpole.task import CARTPOLE_V1, CONSTANT, N_ACTIONS, Task, frame_rate, resolve
+from mjcartpole.physics.simulation import FARTHEST_SANE, Simulation, State, as_seen, check_sane
+from mjcartpole.task import (
+    CARTPOLE_V1,
+    CONSTANT,
+    N_ACTIONS,
+    Task,
+    frame_rate,
+    resolve,
+    wrap_angles,
+)
 
 # What `step` needs, as plain globals: the fewest look-ups and no sign to change.
 _INT64 = np.int64
@@ -35,7 +44,7 @@ _STEP_AFTER_END = (
 )
 
 
-_WIRES = ("_move", "_advance", "_at_hand")
+_WIRES = ("_move", "_middle", "_advance", "_at_hand")
 """What a copy makes anew: functions and views that hold on to one simulation."""
 
 
@@ -214,14 +223,14 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int], CartPo
     def _wire(self, simulation: Simulation) -> None:
         """Keep what `step` needs of a simulation at hand."""
         poles = simulation.cartpole.poles
-        self._move: Callable[[float], State] = (
-            simulation.step if poles == 1 else as_one_pole(simulation.step)
-        )
+        self._move: Callable[[float], State] = as_seen(simulation, self._task)
+        self._middle = starting_state(simulation.cartpole, self._task)
         self._left, self._right = simulation.cartpole.controls
         observation = np.zeros(4, dtype=np.float32)
         # A view that takes single floats several times faster than the array does.
         cells: memoryview[float] = observation.data.cast("B").cast("f")
-        observe = observation.copy if poles == 1 else simulation.observe
+        observe_poles = simulation.observe_turning if self._task.turns else simulation.observe
+        observe = observation.copy if poles == 1 else observe_poles
         self._at_hand = (*self._limits, cells, observe, CONSTANT.get(self._task.reward))
 
     def _set_limits(self, x: float, theta: float) -> None:
@@ -355,6 +364,8 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int], CartPo
             simulation = self._begin(edits)
         super().reset(seed=seed)
         state = self.np_random.uniform(low=low, high=high, size=simulation.size)
+        if self._task.start_angle:
+            state += self._middle
         simulation.set_state(state.tolist())
         # Attributes are set where they change only: that takes as long as a step's arithmetic.
         if self._advance is not self._move:
@@ -362,7 +373,8 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int], CartPo
         self._steps_after_end[0] = None
         if self.render_mode == "human":
             self.render()
-        return state.astype(np.float32), {}
+        seen = wrap_angles(state) if self._task.turns else state
+        return seen.astype(np.float32), {}
 
     def render(self) -> npt.NDArray[np.uint8] | None:
         """Draw the current state.

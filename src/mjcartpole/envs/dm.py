@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from mjcartpole.errors import ConfigError, check_known
+from mjcartpole.physics.bodies import starting_state
 from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.load import Edits, ModelLike, load_model
 from mjcartpole.task import (
@@ -23,6 +24,7 @@ from mjcartpole.task import (
     TASKS,
     Task,
     worst_pole,
+    wrap_angles,
 )
 
 try:
@@ -198,7 +200,8 @@ class Balance(control.Task):  # type: ignore[misc]
         """Draw a starting state."""
         low, high = self._rules.start_low, self._rules.start_high
         size = 2 * len(physics.cartpole.joints)
-        physics.set_state(self.random.uniform(low=low, high=high, size=size))
+        drawn = self.random.uniform(low=low, high=high, size=size)
+        physics.set_state(drawn + starting_state(physics.cartpole, self._rules))
         self._show_reward(physics)
         self.steps = 0
 
@@ -226,20 +229,24 @@ class Balance(control.Task):  # type: ignore[misc]
         self, physics: Physics
     ) -> "collections.OrderedDict[str, npt.NDArray[np.float64]]":
         """The state, positions and velocities apart."""
-        state = physics.state
+        state = self._seen(physics)
         return collections.OrderedDict(position=state[0::2], velocity=state[1::2])
 
     def get_reward(self, physics: Physics) -> float:
         """Return the task's reward: of CartPole-v1, 1 for every step."""
-        x, x_dot, theta, theta_dot = worst_pole(physics.state.tolist())
+        x, x_dot, theta, theta_dot = worst_pole(self._seen(physics).tolist())
         return self._rules.reward(x, x_dot, theta, theta_dot, self._rules.has_ended(x, theta))
 
     def get_termination(self, physics: Physics) -> float | None:
         """Return the discount of the step that ends an episode; None while it goes on."""
-        x, _, theta, _ = worst_pole(physics.state.tolist())
+        x, _, theta, _ = worst_pole(self._seen(physics).tolist())
         if self._rules.has_ended(x, theta):
             return 0.0
         return 1.0 if self.steps >= self._limit else None
+
+    def _seen(self, physics: Physics) -> npt.NDArray[np.float64]:
+        """The state as rules and observations have it."""
+        return wrap_angles(physics.state) if self._rules.turns else physics.state
 
     def _show_reward(self, physics: Physics) -> None:
         if self._visualize_reward:

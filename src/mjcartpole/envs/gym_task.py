@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 from gymnasium import spaces
 
-from mjcartpole.task import Task
+from mjcartpole.task import Task, wrap_angles, wrapped
 
 Observation = npt.NDArray[np.float32]
 
@@ -33,11 +33,25 @@ class GymTask(gymnasium.Wrapper[Observation, np.int64, Observation, np.int64]):
     ) -> tuple[Observation, dict[str, Any]]:
         """Start an episode where the task does, unless the options say otherwise."""
         bounds = {"low": self._task.start_low, "high": self._task.start_high}
-        return self.env.reset(seed=seed, options=bounds | (options or {}))
+        observation, info = self.env.reset(seed=seed, options=bounds | (options or {}))
+        if self._task.start_angle:
+            x, x_dot, theta, theta_dot = self._cartpole.state  # type: ignore[attr-defined]
+            state = np.array([x, x_dot, theta + self._task.start_angle, theta_dot])
+            self._cartpole.state = state  # type: ignore[attr-defined]
+        return self._seen(observation), info
 
     def step(self, action: np.int64) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Advance one control step; the reward is the task's."""
         observation, _, terminated, truncated, info = self.env.step(action)
         x, x_dot, theta, theta_dot = map(float, self._cartpole.state)  # type: ignore[attr-defined]
+        if self._task.turns:
+            theta = wrapped(theta)
         reward = self._task.reward(x, x_dot, theta, theta_dot, terminated)
-        return observation, reward, terminated, truncated, info
+        return self._seen(observation), reward, terminated, truncated, info
+
+    def _seen(self, observation: Observation) -> Observation:
+        """The observation of the state, where a pole may turn or starts elsewhere."""
+        if not (self._task.turns or self._task.start_angle):
+            return observation
+        state = np.array(self._cartpole.state, dtype=np.float64)  # type: ignore[attr-defined]
+        return (wrap_angles(state) if self._task.turns else state).astype(np.float32)

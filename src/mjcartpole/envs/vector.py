@@ -18,6 +18,7 @@ from mjcartpole.integrator import Integrator
 from mjcartpole.media.renderer import DEFAULT_HEIGHT, DEFAULT_WIDTH, Renderer, open_renderer
 from mjcartpole.media.scene import DEFAULT_CAMERA, check_picture
 from mjcartpole.physics.batch_simulation import BatchSimulation
+from mjcartpole.physics.bodies import starting_state
 from mjcartpole.physics.load import Edits, ModelLike, load_model
 from mjcartpole.task import (
     CARTPOLE_V1,
@@ -28,6 +29,7 @@ from mjcartpole.task import (
     resolve,
     state_names,
     worst_pole,
+    wrap_angles,
 )
 
 VectorRenderMode = Literal["rgb_array", "rgb_array_list"]
@@ -171,6 +173,7 @@ class CartPoleVectorEnv(
     def _prepare_episodes(self) -> None:
         """Make what lives from step to step."""
         self._bounds = self._task.start_low, self._task.start_high
+        self._middle = starting_state(self.cartpole, self._task)
         self._has_state = False
         # Steps so far, and at which of them each episode is truncated.
         self._clock = 0
@@ -238,7 +241,7 @@ class CartPoleVectorEnv(
         self._has_state = True
         self._deadlines[who] = self._clock + self.max_episode_steps
         self._ended = np.setdiff1d(self._ended, who, assume_unique=True)
-        return self._simulation.state.astype(np.float32), {}
+        return self._seen().astype(np.float32), {}
 
     def _mask(self, mask: object) -> npt.NDArray[np.intp]:
         """Indices of the environments that a reset is for."""
@@ -298,7 +301,12 @@ class CartPoleVectorEnv(
             rewards[restarted] = 0.0
             terminations[restarted] = False
         self._ended = np.logical_or(terminations, truncations).nonzero()[0]
-        return self._simulation.state.astype(np.float32), rewards, terminations, truncations, {}
+        return self._seen().astype(np.float32), rewards, terminations, truncations, {}
+
+    def _seen(self) -> npt.NDArray[np.float64]:
+        """The states as rules and observations have them, one row each."""
+        states = self._simulation.state
+        return wrap_angles(states) if self._task.turns else states
 
     def _valid(self, actions: npt.ArrayLike) -> npt.NDArray[np.integer[Any]]:
         """The actions as an array, if `action_space.contains` them."""
@@ -332,16 +340,16 @@ class CartPoleVectorEnv(
             if terminations.any():
                 rewards[terminations] = reward(0.0, 0.0, 0.0, 0.0, True)
             return rewards
-        pairs = zip(self._simulation.state.tolist(), terminations.tolist(), strict=True)
+        pairs = zip(self._seen().tolist(), terminations.tolist(), strict=True)
         values = [reward(*worst_pole(state), over) for state, over in pairs]
         return np.array(values, dtype=np.float32)
 
     def _draw(self, n: int) -> npt.NDArray[np.float64]:
         """Starting states of n environments, one row each, drawn in gymnasium's order."""
         low, high = self._bounds
-        return self.np_random.uniform(
-            low=low, high=high, size=(self._simulation.state.shape[1], n)
-        ).T
+        size = self._simulation.state.shape[1], n
+        drawn = self.np_random.uniform(low=low, high=high, size=size).T
+        return drawn + self._middle if self._task.start_angle else drawn
 
     def render(self) -> tuple[npt.NDArray[np.uint8], ...] | None:
         """Draw the current states.

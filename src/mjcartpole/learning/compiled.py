@@ -19,6 +19,7 @@ from mjcartpole.learning.learner import Learner
 from mjcartpole.learning.loop import in_episode
 from mjcartpole.learning.policy import Policy
 from mjcartpole.learning.stepping import GymPhysics, MujocoPhysics, Physics, Rules, link
+from mjcartpole.physics.bodies import starting_state
 from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.cartpole_v1 import FORCE
 from mjcartpole.physics.library import libmujoco
@@ -72,8 +73,8 @@ class CompiledLoop:
         self._simulation = (
             Simulation(load_model(model), integrator) if backend == "mujoco" else None
         )
-        self._memory = _Memory.of(self._simulation)
-        self._physics = _physics(self._simulation, self._memory)
+        self._memory = _Memory.of(self._simulation, task)
+        self._physics = _physics(self._simulation, self._memory, task)
         self._task, self._rules = task, _rules(task)
         size = self._simulation.size if self._simulation else len(state_names())
         self._chunk = _control_steps(self._simulation)
@@ -195,16 +196,20 @@ class _Memory(NamedTuple):
     joints: npt.NDArray[np.int64]
     seen: npt.NDArray[np.float64]
     moved: npt.NDArray[np.float64]
+    start: npt.NDArray[np.float64]
 
     @classmethod
-    def of(cls, simulation: Simulation | None) -> Self:
-        joints = np.array(simulation.cartpole.joints if simulation else (), np.int64)
-        return cls(joints, np.zeros(2 * joints.size), np.zeros(joints.size))
+    def of(cls, simulation: Simulation | None, task: Task) -> Self:
+        if simulation is None:
+            return cls(np.zeros(0, np.int64), *(np.zeros(0),) * 3)
+        joints = np.array(simulation.cartpole.joints, np.int64)
+        start = starting_state(simulation.cartpole, task)[0::2].copy()
+        return cls(joints, np.zeros(2 * joints.size), np.zeros(joints.size), start)
 
 
-def _physics(simulation: Simulation | None, memory: _Memory) -> Physics:
+def _physics(simulation: Simulation | None, memory: _Memory, task: Task) -> Physics:
     if simulation is None:
-        return GymPhysics(-FORCE, FORCE)
+        return GymPhysics(-FORCE, FORCE, float(task.start_angle))
     cartpole, model, data = simulation.cartpole, simulation.model, simulation.data
     left, right = cartpole.controls
     return MujocoPhysics(
@@ -222,6 +227,7 @@ def _physics(simulation: Simulation | None, memory: _Memory) -> Physics:
         explicit=simulation.integrator == "gym",
         seen=memory.seen.ctypes.data,
         moved=memory.moved.ctypes.data,
+        start=memory.start.ctypes.data,
     )
 
 
@@ -232,6 +238,7 @@ def _rules(task: Task) -> Rules:
         low=float(task.start_low),
         width=float(task.start_high - task.start_low),
         time_limit=task.time_limit,
+        turns=task.turns,
     )
 
 

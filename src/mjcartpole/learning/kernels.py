@@ -38,6 +38,7 @@ from mjcartpole.learning.stepping import (
     is_over,
     note,
     observe,
+    pay,
 )
 from mjcartpole.physics import cartpole_v1
 from mjcartpole.physics.simulation import LARGEST_SANE
@@ -83,22 +84,22 @@ def _learn_episode(
     """Play an episode and learn; returns its return, steps and ending."""
     states, actions, rewards = scratch.states, scratch.actions, scratch.rewards
     state = begin(physics, rules, rngs[0])
-    s, mirrored = _folded(_row_of(observe(physics, state), grid), grid.folding)
+    s, mirrored = _folded(_row_of(observe(physics, rules, state), grid), grid.folding)
     states[0] = s
     total, steps, over, terminated = 0.0, 0, False, False
     while not over:
         a = act(p, memory, rates, s, rngs[1])
-        state = advance(physics, state, 1 - a if mirrored else a)
+        state = advance(physics, rules, state, 1 - a if mirrored else a)
         terminated = is_over(rules, state)
         if terminated and has_diverged(state):
             note(physics, state, steps, scratch.failure)
             return total, steps, DIVERGED
-        r = reward(state[0], state[1], state[2], state[3], terminated)
+        r = pay(reward, rules, state, terminated)
         total += r
         actions[steps], rewards[steps] = a, r
         steps += 1
         over = terminated or steps == rules.time_limit
-        s_next, mirrored = _folded(_row_of(observe(physics, state), grid), grid.folding)
+        s_next, mirrored = _folded(_row_of(observe(physics, rules, state), grid), grid.folding)
         after_step(p, memory, rates, Transition(s, a, r, s_next, terminated, over), rngs[1])
         states[steps] = s_next
         s = s_next
@@ -122,13 +123,13 @@ def _play_episode(
     state = begin(physics, rules, rng)
     total, steps, over, terminated = 0.0, 0, False, False
     while not over:
-        s = _row_of(observe(physics, state), grid)
-        state = advance(physics, state, _greedy(tiling, choices, s, grid.folding))
+        s = _row_of(observe(physics, rules, state), grid)
+        state = advance(physics, rules, state, _greedy(tiling, choices, s, grid.folding))
         terminated = is_over(rules, state)
         if terminated and has_diverged(state):
             note(physics, state, steps, failure)
             return total, steps, DIVERGED
-        total += reward(state[0], state[1], state[2], state[3], terminated)
+        total += pay(reward, rules, state, terminated)
         steps += 1
         over = terminated or steps == rules.time_limit
     return total, steps, _ending_index(terminated, state[0], rules.x_limit)

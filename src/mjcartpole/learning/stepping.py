@@ -39,6 +39,8 @@ class Rules(NamedTuple):
     width: float
     """Starting values lie in [low, low + width)."""
     time_limit: int
+    turns: bool
+    """Whether angles count from -pi to pi."""
 
 
 class MujocoPhysics(NamedTuple):
@@ -70,6 +72,8 @@ class MujocoPhysics(NamedTuple):
     """Memory for the observation, shape (2 + 2 poles,)."""
     moved: int
     """Memory for positions, shape (1 + poles,)."""
+    start: int
+    """Where each joint starts, shape (1 + poles,); what is drawn is added."""
 
 
 class GymPhysics(NamedTuple):
@@ -78,6 +82,8 @@ class GymPhysics(NamedTuple):
     left: float
     right: float
     """N."""
+    start: float
+    """Angle at the start, rad; what is drawn is added."""
 
 
 Physics: TypeAlias = MujocoPhysics | GymPhysics
@@ -122,7 +128,7 @@ def _array_at(kind: types.Type) -> Callable[[int], Any]:
 _floats, _ints = _array_at(types.float64), _array_at(types.int64)
 
 
-_max_abs = compiled(task.max_abs)
+_max_abs, _wrapped = compiled(task.max_abs), compiled(task.wrapped)
 _carray = numba.carray  # type: ignore[attr-defined]
 _cartpole_v1_step = compiled(cartpole_v1.cartpole_v1_step)
 
@@ -149,16 +155,17 @@ def _for_each(mujoco: F, gym: F) -> Callable[[F], F]:
 def _begin_mujoco(physics: AnyPhysics, rules: Rules, rng: np.random.Generator) -> State:
     _mj_reset(physics.model, physics.data)
     joints, qpos, qvel = _ints(physics.joints), _floats(physics.qpos), _floats(physics.qvel)
+    start = _floats(physics.start)
     for index in range(physics.n_joints):
-        qpos[joints[index]] = rules.low + rules.width * rng.random()
+        qpos[joints[index]] = rules.low + rules.width * rng.random() + start[index]
         qvel[joints[index]] = rules.low + rules.width * rng.random()
-    return _as_one_pole(physics)
+    return _as_one_pole(physics, rules)
 
 
 def _begin_gym(physics: AnyPhysics, rules: Rules, rng: np.random.Generator) -> State:
     x = rules.low + rules.width * rng.random()
     x_dot = rules.low + rules.width * rng.random()
-    theta = rules.low + rules.width * rng.random()
+    theta = rules.low + rules.width * rng.random() + physics.start
     theta_dot = rules.low + rules.width * rng.random()
     return x, x_dot, theta, theta_dot
 
@@ -175,7 +182,7 @@ def begin(physics: AnyPhysics, rules: Rules, rng: np.random.Generator) -> State:
 # --- move it ------------------------------------------------------------------------------------
 
 
-def _advance_mujoco(physics: AnyPhysics, state: State, action: int) -> State:
+def _advance_mujoco(physics: AnyPhysics, rules: Rules, state: State, action: int) -> State:
     joints, qpos, qvel = _ints(physics.joints), _floats(physics.qpos), _floats(physics.qvel)
     moved, h = _floats(physics.moved), physics.timestep
     _floats(physics.ctrl)[0] = physics.right if action == 1 else physics.left
@@ -186,60 +193,72 @@ def _advance_mujoco(physics: AnyPhysics, state: State, action: int) -> State:
         if physics.explicit:
             for index in range(physics.n_joints):
                 qpos[joints[index]] = moved[index]
-    return _as_one_pole(physics)
+    return _as_one_pole(physics, rules)
 
 
-def _advance_gym(physics: AnyPhysics, state: State, action: int) -> State:
+def _advance_gym(physics: AnyPhysics, rules: Rules, state: State, action: int) -> State:
     force = physics.right if action == 1 else physics.left
     return _cartpole_v1_step(state[0], state[1], state[2], state[3], force)
 
 
 @_for_each(_advance_mujoco, _advance_gym)
-def advance(physics: AnyPhysics, state: State, action: int) -> State:
+def advance(physics: AnyPhysics, rules: Rules, state: State, action: int) -> State:
     """Return the state one control step later."""
     raise NotImplementedError
 
 
 @compiled
-def _as_one_pole(physics: AnyPhysics) -> State:
+def _as_one_pole(physics: AnyPhysics, rules: Rules) -> State:
     joints, qpos, qvel = _ints(physics.joints), _floats(physics.qpos), _floats(physics.qvel)
     theta, theta_dot = qpos[joints[1]], qvel[joints[1]]
     if physics.n_joints > 2:
-        theta, theta_dot = _worst(qpos, physics), _worst(qvel, physics)
+        theta, theta_dot = _worst(qpos, physics, rules.turns), _worst(qvel, physics, False)
     return qpos[joints[0]], qvel[joints[0]], theta, theta_dot
 
 
 @compiled
-def _worst(values: Any, physics: AnyPhysics) -> float:
-    """Return the largest size among the poles' values."""
+def _worst(values: Any, physics: AnyPhysics, turns: bool) -> float:
+    """Return the largest size among the poles' values, of angles that count from -pi to pi."""
     joints, poles = _ints(physics.joints), _floats(physics.moved)
     for index in range(1, physics.n_joints):
-        poles[index - 1] = values[joints[index]]
+        value = values[joints[index]]
+        poles[index - 1] = _wrapped(value) if turns else value
     return _max_abs(_carray(poles, physics.n_joints - 1))
 
 
 # --- look at it ---------------------------------------------------------------------------------
 
 
-def _observe_mujoco(physics: AnyPhysics, state: State) -> Any:
+def _observe_mujoco(physics: AnyPhysics, rules: Rules, state: State) -> Any:
     joints, seen = _ints(physics.joints), _floats(physics.seen)
     qpos, qvel = _floats(physics.qpos), _floats(physics.qvel)
     for index in range(physics.n_joints):
-        seen[2 * index] = np.float64(np.float32(qpos[joints[index]]))
+        position = qpos[joints[index]]
+        if rules.turns and index > 0:
+            position = _wrapped(position)
+        seen[2 * index] = np.float64(np.float32(position))
         seen[2 * index + 1] = np.float64(np.float32(qvel[joints[index]]))
     return seen
 
 
-def _observe_gym(physics: AnyPhysics, state: State) -> State:
+def _observe_gym(physics: AnyPhysics, rules: Rules, state: State) -> State:
     x, x_dot = np.float64(np.float32(state[0])), np.float64(np.float32(state[1]))
-    theta, theta_dot = np.float64(np.float32(state[2])), np.float64(np.float32(state[3]))
+    angle = _wrapped(state[2]) if rules.turns else state[2]
+    theta, theta_dot = np.float64(np.float32(angle)), np.float64(np.float32(state[3]))
     return x, x_dot, theta, theta_dot
 
 
 @_for_each(_observe_mujoco, _observe_gym)
-def observe(physics: AnyPhysics, state: State) -> Any:
+def observe(physics: AnyPhysics, rules: Rules, state: State) -> Any:
     """Return the float32 observation, as plain floats again."""
     raise NotImplementedError
+
+
+@compiled
+def pay(reward: task.Reward, rules: Rules, state: State, terminated: bool) -> float:
+    """Return the reward of a step."""
+    theta = _wrapped(state[2]) if rules.turns else state[2]
+    return reward(state[0], state[1], theta, state[3], terminated)
 
 
 @compiled

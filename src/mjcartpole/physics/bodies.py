@@ -3,7 +3,8 @@
 import mujoco
 import numpy as np
 
-from mjcartpole.physics.cartpole import CartPole
+from mjcartpole.physics.cartpole import CartPole, Vector
+from mjcartpole.task import Task
 
 
 def subtree(model: mujoco.MjModel, root: int) -> list[int]:
@@ -38,6 +39,18 @@ def pole_bodies(cartpole: CartPole, pole: int = 0) -> list[int]:
     ]
     upper = {body for other in above for body in _under(cartpole, other)}
     return [body for body in whole if body not in upper]
+
+
+def starting_state(cartpole: CartPole, task: Task) -> Vector:
+    """Return the state around which a task's episodes start, shape (2 + 2 poles,)."""
+    state = np.zeros(2 * len(cartpole.joints))
+    for pole, hinge in enumerate(cartpole.hinges):
+        body = int(cartpole.model.jnt_bodyid[hinge])
+        others = (other for other in cartpole.hinges if other != hinge)
+        # A pole on another is in line with it at its own angle 0.
+        if not any(body in _under(cartpole, other) for other in others):
+            state[2 + 2 * pole] = task.start_angle
+    return state
 
 
 def data_at_zero(model: mujoco.MjModel) -> mujoco.MjData:

@@ -102,6 +102,10 @@ class Simulation:
         """Return the state as an observation, shape (size,)."""
         return self.state.astype(np.float32)
 
+    def observe_turning(self) -> npt.NDArray[np.float32]:
+        """Return the same where poles may turn right round."""
+        return task.wrap_angles(self.state).astype(np.float32)
+
     def steps(self, states: Vector, controls: Vector) -> Vector:
         """Return the states after one control step from each of many.
 
@@ -250,13 +254,28 @@ def _state_of(
     return tuple([value for joint in joints for value in (qpos[joint], qvel[joint])])
 
 
-def as_one_pole(step: Callable[[float], State]) -> Callable[[float], State]:
-    """Return steps of several poles that give what the rules look at: the worst of all."""
+def as_seen(simulation: Simulation, rules: task.Task) -> Callable[[float], State]:
+    """Return steps that give what rules look at: of several poles the worst, of any turn the rest.
 
-    def advance(control: float) -> State:
+    Args:
+        simulation: Does the steps.
+        rules: The task's.
+    """
+    step, is_one = simulation.step, simulation.cartpole.poles == 1
+
+    def turn(control: float) -> State:
+        x, x_dot, theta, theta_dot = step(control)
+        return x, x_dot, task.wrapped(theta), theta_dot
+
+    def move_poles(control: float) -> State:
         return task.worst_pole(step(control))
 
-    return advance
+    def turn_poles(control: float) -> State:
+        return task.worst_pole(task.wrap_angles(np.array(step(control))).tolist())
+
+    if is_one:
+        return turn if rules.turns else step
+    return turn_poles if rules.turns else move_poles
 
 
 def gave_up(cartpole: CartPole, error: Exception) -> SimulationError:
