@@ -121,7 +121,7 @@ def test_rows_are_those_of_the_float32_observation(state):
     with np.errstate(over="ignore"):
         seen = np.array(state).astype(np.float32).astype(np.float64)
     if np.isfinite(seen).all():
-        assert row(GYM, state, compiled._arrays(GRID.grid)) == GRID(seen.tolist())
+        assert row(GYM, RULES, state, compiled._arrays(GRID.grid)) == GRID(seen.tolist())
 
 
 @given(states)

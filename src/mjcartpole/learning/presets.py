@@ -1,8 +1,9 @@
 """Presets: trainings with a name, each by what it changes in the defaults of `TrainConfig`."""
 
+import math
 from typing import Any, Final
 
-from mjcartpole.task import CARTPOLE_V1
+from mjcartpole.task import CARTPOLE_V1, SWING_UP
 
 # The article's ranges, as its code has them: the float32 bound of the angle, and 3.5 rad/s.
 _ARTICLE_THETA: Final = float(CARTPOLE_V1.observation_bound()[2])
@@ -71,6 +72,22 @@ _QUICK: dict[str, Any] = {
     "plan_after": "failure",
     "log_every": 6,
 }
+# From a high first value down: what was never tried looks better than what was, all the way up.
+_SWING_UP: dict[str, Any] = {
+    "task": SWING_UP.name,
+    "episodes": 10_000,
+    "bins": (5, 7, 32, 21),
+    "low": (-2.4, -3.0, -math.pi, -9.0),
+    "high": (2.4, 3.0, math.pi, 9.0),
+    "gamma": 0.99,
+    "alpha": 0.2,
+    "alpha_final": 0.02,
+    "epsilon": 0.1,
+    "q_init_low": 100.0,
+    "q_init_high": 100.0,
+    "td_lambda": 0.8,
+    "log_every": 1_000,
+}
 # Nodes on the limits, or edges would count as if nobody ever fell there.
 _PLANNED: dict[str, Any] = {
     "method": "planning",
@@ -89,5 +106,6 @@ PRESETS: Final[dict[str, dict[str, Any]]] = {
     "damped": _DAMPED,
     "quick": _QUICK,
     "planned": _PLANNED,
+    "swing-up": _SWING_UP,
 }
 """What each preset changes in the defaults of `TrainConfig`, which are those of `tuned`."""

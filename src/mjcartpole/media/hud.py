@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from mjcartpole.media.palette import ACTION, FAINT, INK, LINE, PAPER, UNCHOSEN, Colour
 from mjcartpole.media.text import Lettering, Pixels
-from mjcartpole.task import state_names
+from mjcartpole.task import state_names, wrapped
 
 _SMALLEST_FONT: Final = 10
 _FONT_PER_HEIGHT: Final = 1 / 32
@@ -77,6 +77,12 @@ def _blocks(poles: int) -> list[_Block]:
     return [_PROGRESS, *(tuple(state[row : row + 2]) for row in range(0, len(state), 2)), _VALUES]
 
 
+def _in_five_signs(total: float) -> str:
+    """Return a return as exactly as its field has room for."""
+    texts = (f"{total:g}", f"{total:.2f}", f"{total:.1f}", f"{total:.0f}")
+    return next((text for text in texts if len(text) <= 5), texts[-1])
+
+
 class Strip:
     """The strip of a picture of some size.
 
@@ -103,13 +109,15 @@ class Strip:
         if not len(self.pixels):
             return self.pixels
         self._write("step", f"{moment.step:d}")
-        self._write("return", f"{moment.total:g}")
+        self._write("return", _in_five_signs(moment.total))
         x, x_dot, *of_poles = (float(value) for value in moment.state)
         self._write("x", f"{x:+.2f} m")
         self._write("x_dot", f"{x_dot:+.2f} m/s")
         for index, value in enumerate(of_poles):
-            degrees = math.degrees(value)
-            text = f"{degrees:+.0f}°/s" if index % 2 else f"{degrees:+.1f}°"
+            if index % 2:
+                text = f"{math.degrees(value):+.0f}°/s"
+            else:
+                text = f"{math.degrees(wrapped(value)):+.1f}°"
             self._write(self._names[2 + index], text)
         for action in (0, 1):
             self._show_value(action, moment)
