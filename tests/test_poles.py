@@ -22,7 +22,8 @@ from mjcartpole.learning.evaluation import evaluate
 from mjcartpole.learning.training import Training, train
 from mjcartpole.physics.load import load_model
 from mjcartpole.physics.simulation import Simulation
-from mjcartpole.studies.film import Film, PolicySetup, play
+from mjcartpole.studies.film import Film, play
+from mjcartpole.studies.policy_setup import PolicySetup
 from mjcartpole.studies.transfer import transfer
 from mjcartpole.studies.video_options import VideoOptions
 from mjcartpole.task import CARTPOLE_V1

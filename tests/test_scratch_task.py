@@ -21,7 +21,8 @@ from mjcartpole.learning.documents import read_config
 from mjcartpole.learning.evaluation import evaluate
 from mjcartpole.learning.policy import Policy
 from mjcartpole.learning.training import train
-from mjcartpole.studies.film import PolicySetup, play
+from mjcartpole.studies.film import play
+from mjcartpole.studies.policy_setup import PolicySetup
 from mjcartpole.task import TASKS, Task
 from nightly import few
 

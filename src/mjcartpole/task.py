@@ -124,6 +124,11 @@ class Task:
         """What no episode's return exceeds; infinite where the reward is one's own function."""
         return CONSTANT.get(self.reward, math.inf) * self.time_limit
 
+    @property
+    def return_span(self) -> tuple[float, float] | tuple[None, None]:
+        """What returns lie between: known of a step's 1, else left to what is found."""
+        return (0, self.time_limit) if self.reward is one_per_step else (None, None)
+
     def observation_bound(self, poles: int = 1) -> npt.NDArray[np.float32]:
         """Return the upper bound of the observation, shape (2 + 2 poles,); the lower is minus that.
 

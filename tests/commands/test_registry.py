@@ -16,7 +16,8 @@ SCRATCH = '''
 import math
 from dataclasses import dataclass, field
 
-from mjcartpole.commands.options import Command, EvalTarget, Included
+from mjcartpole.commands.options import Command, Included
+from mjcartpole.studies.eval_target import EvalTarget
 from mjcartpole.errors import ConfigError
 
 

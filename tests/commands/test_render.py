@@ -16,8 +16,8 @@ import pytest
 from PIL import Image
 
 from command_line import QUICK, call, done
-from mjcartpole.commands.options import EvalTarget
 from mjcartpole.commands.policies import set_up
+from mjcartpole.studies.eval_target import EvalTarget
 from mjcartpole.studies.film import play
 from nightly import few
 

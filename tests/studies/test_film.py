@@ -17,7 +17,8 @@ from mjcartpole.media.montage import state_at
 from mjcartpole.media.overlay import Overlay
 from mjcartpole.media.renderer import open_renderer
 from mjcartpole.physics.load import load_model
-from mjcartpole.studies.film import Film, PolicySetup, Rollout, play
+from mjcartpole.studies.film import Film, Rollout, play
+from mjcartpole.studies.policy_setup import PolicySetup
 from mjcartpole.studies.video_options import FALL_SECONDS, FALL_SPEED, VideoOptions
 from mjcartpole.task import CONTROL_STEP
 
@@ -271,7 +272,8 @@ LONG = """
     import numpy as np
     sys.path.insert(0, sys.argv[1])
     from test_film import SMALL, some_policy
-    from mjcartpole.studies.film import Film, PolicySetup, play
+    from mjcartpole.studies.film import Film, play
+    from mjcartpole.studies.policy_setup import PolicySetup
     from mjcartpole.studies.video_options import VideoOptions
     from mjcartpole.media.video import write_video
 

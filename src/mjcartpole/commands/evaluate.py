@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from mjcartpole.commands.options import Command, EvalTarget, Included
+from mjcartpole.commands.options import Command, Included
 from mjcartpole.commands.printing import counted, print_evaluation, print_seeds
 from mjcartpole.learning.evaluation import EPISODES, Evaluation, evaluate
+from mjcartpole.studies.eval_target import EvalTarget
 
 if TYPE_CHECKING:
-    from mjcartpole.studies.film import PolicySetup
+    from mjcartpole.studies.policy_setup import PolicySetup
     from mjcartpole.studies.seeds import ManyResult
 
 

@@ -21,7 +21,8 @@ from mjcartpole.media.mp4 import why_no_mp4
 from mjcartpole.media.video import Video, write_video
 from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.signals import Interrupted, StopSignals
-from mjcartpole.studies.film import Film, Frame, PolicySetup, Rollout, play
+from mjcartpole.studies.film import Film, Frame, Rollout, play
+from mjcartpole.studies.policy_setup import PolicySetup
 from mjcartpole.studies.video_options import VideoOptions
 
 SHEET_FRAMES = 10

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 from mjcartpole.commands.options import (
     Command,
-    EvalTarget,
     Included,
     OutputPath,
     Policies,
@@ -16,10 +15,11 @@ from mjcartpole.errors import FileError, RenderError
 from mjcartpole.files import check_free, check_writable
 from mjcartpole.learning.evaluation import check_count
 from mjcartpole.signals import StopSignals
+from mjcartpole.studies.eval_target import EvalTarget
 from mjcartpole.studies.video_options import VideoOptions
 
 if TYPE_CHECKING:
-    from mjcartpole.studies.film import PolicySetup
+    from mjcartpole.studies.policy_setup import PolicySetup
 
 
 @dataclass(frozen=True)

@@ -8,14 +8,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mjcartpole.commands.options import Command, EvalTarget, OutputPath, Policies
+from mjcartpole.commands.options import Command, OutputPath, Policies
 from mjcartpole.errors import ConfigError
 from mjcartpole.integrator import Integrator
 from mjcartpole.learning.evaluation import EPISODES, SEED
 from mjcartpole.learning.policy import Policy
+from mjcartpole.studies.eval_target import EvalTarget
 
 if TYPE_CHECKING:
-    from mjcartpole.studies.film import PolicySetup
+    from mjcartpole.studies.policy_setup import PolicySetup
     from mjcartpole.task import Task
 
 PolicyGroups = Mapping[str, Sequence[Policy]]

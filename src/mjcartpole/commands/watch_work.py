@@ -20,8 +20,9 @@ from mjcartpole.media.renderer import open_renderer
 from mjcartpole.output import stdout_problem
 from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.signals import StopSignals
-from mjcartpole.studies.film import PolicySetup, play
+from mjcartpole.studies.film import play
 from mjcartpole.studies.parity import Result, Subject, run_ladder
+from mjcartpole.studies.policy_setup import PolicySetup
 from mjcartpole.studies.video_options import VideoOptions
 from mjcartpole.task import CARTPOLE_V1
 

@@ -65,6 +65,25 @@ def all_weights(tiles: Any) -> int:
     return 1 if tiles is None or tiles.interpolated else 1 << tiles.bits
 
 
+def home(tiles: Any, s: int) -> int:
+    """Return the row that a state is counted in: of the tiling that is not moved, the nearest node.
+
+    Args:
+        tiles: `Tiles`, or None where a state is a row.
+        s: The state.
+    """
+    if tiles is None:
+        return s
+    half = (1 << tiles.bits) >> 1 if tiles.interpolated else 0
+    row, stride = 0, 1
+    for axis in range(len(tiles.bins) - 1, -1, -1):
+        cells = ((tiles.bins[axis] - 1) << tiles.bits) + 1
+        row += stride * ((s % cells + half) >> tiles.bits)
+        s //= cells
+        stride *= tiles.bins[axis]
+    return row
+
+
 def row_in(tiles: Any, tiling: int, row: int, within: int) -> int:
     """Return the row of a state in one of the tilings, from what `place` returned."""
     stride = 1

@@ -2,22 +2,40 @@
 
 import contextlib
 import importlib.util
+import io
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, Protocol
+
+import numpy as np
 
 from mjcartpole.errors import RenderError
 from mjcartpole.files import atomic_write
-from mjcartpole.media.palette import CURVES, GRID, INK, LINE, PAPER, Colour
+from mjcartpole.media.palette import CURVES, FAINT, GRID, INK, LINE, PAPER, Colour
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 DATES: Final = {".png": {}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
 """What each kind of file would say of the day, so that the same plot has the same bytes."""
 
 MISSING_LIBRARY: Final = "a plot needs the package matplotlib: pip install 'mjcartpole[plot]'"
+
+
+class Plot(Protocol):
+    """Numbers that can be drawn."""
+
+    def figure(self) -> "Figure":
+        """Draw them.
+
+        Raises:
+            RenderError: matplotlib is not installed.
+        """
+
+    def rows(self) -> Iterator[Mapping[str, object]]:
+        """Yield exactly what is drawn, as the lines of a table."""
 
 
 def is_installed() -> bool:
@@ -52,6 +70,12 @@ def plain(text: str) -> str:
     return text.encode("utf-8", "replace").decode().replace("$", r"\$")
 
 
+def short(text: str, most: int = 40) -> str:
+    """Return a name as it is to be given to matplotlib, without its middle if it is long."""
+    cut = len(text) > most
+    return plain(f"{text[: most // 2]}...{text[len(text) - most // 2 + 3 :]}" if cut else text)
+
+
 @contextlib.contextmanager
 def plot_style() -> Iterator[None]:
     """Have what is plotted inside look the same everywhere, whatever a user's own settings are.
@@ -82,23 +106,56 @@ def plot_style() -> Iterator[None]:
         yield
 
 
-@plot_style()
-def write_plot(figure: "Figure", path: Path) -> None:
-    """Write a plot as its file's suffix says: PNG, SVG or PDF.
+def level(axes: "Axes", y: float) -> None:
+    """Draw a value right across, with its number."""
+    axes.axhline(y, color=css(FAINT), linewidth=1)
+    text = axes.annotate(f"{y:g}", (1, y), (0, -3), axes.get_yaxis_transform(), "offset points")
+    text.set(color=css(FAINT), ha="right", va="top")
 
-    Of a figure without a layout of its own, what lies around its axes is part of the picture.
+
+def ink_on(colour: Any) -> str:  # noqa: ANN401
+    """Return the ink that is seen on a colour of matplotlib's, dark or light."""
+    lightness = float(np.dot(colour[:3], (0.299, 0.587, 0.114)))
+    return css(INK if lightness > 0.55 else PAPER)
+
+
+def check_suffix(path: Path) -> str:
+    """Return which kind of plot a file's name asks for.
 
     Raises:
-        RenderError: The suffix is another one, or matplotlib is not installed.
-        FileError: The file cannot be written.
+        RenderError: None that there is.
     """
     suffix = path.suffix.lower()
     if suffix not in DATES:
         raise RenderError(
             f"'{path}' is no plot's name; its suffix says what is written: {', '.join(DATES)}"
         )
-    box = None if figure.get_layout_engine() else "tight"
+    return suffix
+
+
+def write_plot(figure: "Figure", path: Path) -> None:
+    """Write a plot as its file's suffix says: PNG, SVG or PDF.
+
+    Raises:
+        RenderError: The suffix is another one, or matplotlib is not installed.
+        FileError: The file cannot be written.
+    """
+    suffix = check_suffix(path)
     with atomic_write(path) as temporary:
-        figure.savefig(
-            temporary, format=suffix[1:], bbox_inches=box, pad_inches=0.15, metadata=DATES[suffix]
-        )
+        _save(figure, temporary, suffix)
+
+
+def svg_of(figure: "Figure") -> str:
+    """Return a plot as SVG."""
+    text = io.BytesIO()
+    _save(figure, text, ".svg")
+    return text.getvalue().decode()
+
+
+@plot_style()
+def _save(figure: "Figure", target: Path | io.BytesIO, suffix: str) -> None:
+    # Of a figure without a layout of its own, what lies around its axes is part of the picture.
+    box = None if figure.get_layout_engine() else "tight"
+    figure.savefig(
+        target, format=suffix[1:], bbox_inches=box, pad_inches=0.15, metadata=DATES[suffix]
+    )

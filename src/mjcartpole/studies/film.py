@@ -10,53 +10,22 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from mjcartpole.envs.backend import Backend, make_env
-from mjcartpole.integrator import Integrator
+from mjcartpole.envs.backend import make_env
 from mjcartpole.learning.episodes import ENDINGS, Episode
-from mjcartpole.learning.evaluation import SEED, check_count
+from mjcartpole.learning.evaluation import check_count
 from mjcartpole.learning.loop import play_episode
-from mjcartpole.learning.policy import Policy
 from mjcartpole.media.hud import Moment
 from mjcartpole.media.montage import equally_spaced, sheet, side_by_side, state_at, time_label
 from mjcartpole.media.overlay import Overlay
 from mjcartpole.media.renderer import Renderer, open_renderer
-from mjcartpole.physics.cartpole import CartPole
-from mjcartpole.physics.load import ModelLike, load_model
+from mjcartpole.studies.policy_setup import PolicySetup
 from mjcartpole.studies.video_options import VideoOptions
-from mjcartpole.task import CARTPOLE_V1, Task, worst_pole
+from mjcartpole.task import worst_pole
 
 _ROUNDING: Final = 1e-6
 """More than what a place can be off by, in control steps."""
 
 Frame = npt.NDArray[np.uint8]
-
-
-@dataclass(frozen=True)
-class PolicySetup:
-    """A policy and where it is played.
-
-    Attributes:
-        name: What a person calls it.
-        policy: The policy.
-        backend: Who does the physics.
-        model: What moves, for backend mujoco; gymnasium's cart-pole is drawn as the reference.
-        integrator: See `Simulation`.
-        seed: Seeds the first episode's starting state.
-        task: The rules.
-    """
-
-    name: str
-    policy: Policy
-    backend: Backend = "mujoco"
-    model: ModelLike = "cartpole"
-    integrator: Integrator = "gym"
-    seed: int = SEED
-    task: Task = CARTPOLE_V1
-
-    @functools.cached_property
-    def cartpole(self) -> CartPole:
-        """What is drawn."""
-        return load_model(self.model)
 
 
 @dataclass(frozen=True, eq=False)

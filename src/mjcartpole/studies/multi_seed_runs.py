@@ -55,6 +55,15 @@ def is_seeds(path: Path) -> bool:
     return is_file(path / SEEDS)
 
 
+def seeds_of(folder: Path) -> list[Path]:
+    """Return the runs that a folder of many seeds names, whether they are there or not.
+
+    Raises:
+        RunError: The folder is damaged.
+    """
+    return [seed_folder(folder, seed) for seed in _read_seeds(folder)[2]]
+
+
 def learned_seeds(folder: Path) -> tuple[dict[int, Path], list[int]]:
     """Return the runs of a folder of many seeds that have a policy, by seed, and the seeds without.
 
@@ -168,7 +177,7 @@ def _check_free(folder: Path, overwrite: bool) -> None:
 def _clear(folder: Path) -> None:
     """Remove the runs of all seeds that a folder names, and nothing else."""
     if SEEDS in runs.content_of(folder):
-        before = [seed_folder(folder, seed) for seed in _read_seeds(folder)[2]]
+        before = seeds_of(folder)
         for each in before:
             check_here(each)
         for each in before:

@@ -4,11 +4,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mjcartpole.media.palette import FAINT, INK, MISSING, PAPER
-from mjcartpole.media.plots import css, plain, plot_style
+from mjcartpole.media.palette import MISSING, PAPER
+from mjcartpole.media.plots import css, ink_on, level, plain, plot_style, short
 from mjcartpole.studies.sweep import SweepResult
 from mjcartpole.studies.transfer import Cell, TransferResult
-from mjcartpole.task import one_per_step
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -31,7 +30,7 @@ def heat_map(result: TransferResult) -> "Figure":
     rows, columns = result.means.shape
     figure = Figure(figsize=(CELL[0] * columns, CELL[1] * rows))
     axes = figure.add_axes((0, 0, 1, 1))
-    low, high = _span(result)
+    low, high = result.task.return_span
     colours = colormaps["viridis"].with_extremes(bad=css(MISSING))
     image = axes.imshow(result.means, colours, aspect="auto", vmin=low, vmax=high)
     axes.grid(visible=False)
@@ -41,9 +40,9 @@ def heat_map(result: TransferResult) -> "Figure":
     for y, cells in enumerate(result.rows):
         for x, cell in enumerate(cells):
             _letter(axes, (x, y), cell, image.to_rgba(np.array(cell.mean)))
-    names = [_short(name, 40) for name in result.places]
+    names = [short(name) for name in result.places]
     axes.set_xticks(range(columns), names, rotation=45, ha="left", rotation_mode="anchor")
-    axes.set_yticks(range(rows), [_short(name, 34) for name in result.policies])
+    axes.set_yticks(range(rows), [short(name, 34) for name in result.policies])
     axes.tick_params(which="both", length=0, labeltop=True, labelbottom=False)
     axes.spines[:].set_visible(False)
     episodes = max(len(cell.evaluation.episodes) if cell.evaluation else 0 for cell in result.cells)
@@ -69,29 +68,16 @@ def curves(result: SweepResult) -> "Figure":
         bands = [cell.interval or (np.nan, np.nan) for cell in cells]
         axes.fill_between(result.values, *np.transpose(bands), alpha=0.2, linewidth=0)
         axes.plot(result.values, [cell.mean for cell in cells], "o-", markersize=5, clip_on=False)
-    axes.set(xlabel=plain(result.key), title=f"mean greedy return on {_short(result.model, 50)}")
-    axes.set_ylim(*_span(result.played))
+    axes.set(xlabel=plain(result.key), title=f"mean greedy return on {short(result.model, 50)}")
+    axes.set_ylim(*result.played.task.return_span)
     axes.margins(x=0)
     if result.threshold is not None:
-        _mark_level(axes, result.threshold)
+        level(axes, result.threshold)
     legend = figure.legend(axes.lines[: len(policies)], policies, loc="outside lower left")
     for text, name in zip(legend.get_texts(), policies, strict=True):
         # Set here: a label that begins with an underscore would be left out.
-        text.set_text(_short(name, 40) + _in_words(result, name))
+        text.set_text(short(name) + _in_words(result, name))
     return figure
-
-
-def _span(result: TransferResult) -> tuple[float, float] | tuple[None, None]:
-    """Return what a return lies between: known of a step's 1, else left to what was found."""
-    task = result.task
-    return (0, task.time_limit) if task.reward is one_per_step else (None, None)
-
-
-def _mark_level(axes: "Axes", y: float) -> None:
-    """Draw a return right across, with its number."""
-    axes.axhline(y, color=css(FAINT), linewidth=1)
-    text = axes.annotate(f"{y:g}", (1, y), (0, -3), axes.get_yaxis_transform(), "offset points")
-    text.set(color=css(FAINT), ha="right", va="top")
 
 
 def _in_words(result: SweepResult, policy: str) -> str:
@@ -104,12 +90,7 @@ def _in_words(result: SweepResult, policy: str) -> str:
 def _letter(axes: "Axes", place: tuple[int, int], cell: Cell, colour: Any) -> None:  # noqa: ANN401
     """Write a cell's mean and interval, in the ink that is seen on its colour."""
     x, y = place
-    lightness = float(np.dot(colour[:3], (0.299, 0.587, 0.114)))
-    style: dict[str, Any] = {
-        "color": css(INK if lightness > 0.55 else PAPER),
-        "ha": "center",
-        "va": "center",
-    }
+    style: dict[str, Any] = {"color": ink_on(colour), "ha": "center", "va": "center"}
     if cell.interval is None:
         axes.text(x, y, "failed", **style)
         return
@@ -117,9 +98,3 @@ def _letter(axes: "Axes", place: tuple[int, int], cell: Cell, colour: Any) -> No
     axes.text(
         x, y + 0.25, f"{cell.interval.low:.0f} to {cell.interval.high:.0f}", fontsize=8, **style
     )
-
-
-def _short(text: str, most: int) -> str:
-    """Return a name, without its middle if it is long."""
-    cut = len(text) > most
-    return plain(f"{text[: most // 2]}...{text[len(text) - most // 2 + 3 :]}" if cut else text)

@@ -9,7 +9,7 @@ against published ones. Scores are one number per run, shape (n,), or one per ru
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -24,6 +24,7 @@ BLOCK: Final = 2**20
 """So many scores are drawn at once: 8 MiB."""
 
 Array = npt.NDArray[np.float64]
+Average = Literal["mean", "iqm"]
 Statistic = Callable[[Array], float]
 """From scores of shape (n,) or (n, m) to one number."""
 
@@ -156,6 +157,57 @@ def bootstrap_interval(
     values = _checked(scores)
     drawn = _resample(values, times=resamples, seed=seed)
     return _percentiles((_of_each(samples, statistic) for (samples,) in drawn), confidence)
+
+
+def bootstrap_band(
+    curves: npt.ArrayLike,
+    average: Average = "mean",
+    *,
+    confidence: float = CONFIDENCE,
+    resamples: int = 1_000,
+    seed: int = 0,
+) -> tuple[Array, Array, Array]:
+    """Return the average of runs at each point of their curves, and its percentile interval there.
+
+    Whole runs are drawn; the interval holds for each point by itself.
+
+    Args:
+        curves: Shape (runs, points).
+        average: The mean, or the interquartile mean.
+        confidence: See `bootstrap_interval`.
+        resamples: See `bootstrap_interval`.
+        seed: See `bootstrap_interval`.
+
+    Raises:
+        ConfigError: The curves are empty or not finite.
+    """
+    values = np.atleast_2d(_checked(curves, "curves"))
+    n = len(values)
+    cut = n // 4 if average == "iqm" else 0
+    drawn = np.random.default_rng(seed).multinomial(n, np.full(n, 1 / n), size=resamples)
+    tail = (1 - confidence) / 2
+    low, high = np.quantile(_trimmed(values, drawn, cut), (tail, 1 - tail), axis=0)
+    return _trimmed(values, np.ones((1, n), np.int64), cut)[0], low, high
+
+
+def _trimmed(values: Array, counts: npt.NDArray[np.int64], cut: int) -> Array:
+    """Return the mean of each column without so many values at either end, shape (draws, points).
+
+    Args:
+        values: Shape (runs, points).
+        counts: How often each run was drawn, shape (draws, runs).
+        cut: How many.
+    """
+    n = len(values)
+    if not cut:
+        means: Array = counts @ values / n
+        return means
+    found = np.empty((len(counts), values.shape[1]))
+    for point, column in enumerate(values.T):
+        order = np.argsort(column)
+        up_to = np.clip(np.cumsum(counts[:, order], axis=1), cut, n - cut)
+        found[:, point] = np.diff(up_to, prepend=cut, axis=1) @ column[order] / (n - 2 * cut)
+    return found
 
 
 def _of_each(samples: Array, statistic: Statistic) -> npt.ArrayLike:

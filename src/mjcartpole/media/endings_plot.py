@@ -1,0 +1,120 @@
+"""How episodes end: along a training, and those of the greedy policy after it."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+import numpy.typing as npt
+
+from mjcartpole.media.palette import CURVES, INK, MISSING
+from mjcartpole.media.plots import css, plot_style, short
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+MOST_ROWS: Final = 40
+
+Floats = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Endings:
+    """Shares of endings of one run, or of many seeds together.
+
+    Attributes:
+        name: What a person calls it.
+        episodes: The last episode of each stretch of the training, shape (k,).
+        shares: Of each ending in each stretch, shape (endings, k).
+        greedy: Of each ending of the greedy policy, shape (endings,); None: it was not played.
+    """
+
+    name: str
+    episodes: npt.NDArray[np.int64]
+    shares: Floats
+    greedy: Floats | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class EndingsPlot:
+    """Endings of runs, one above the other.
+
+    Attributes:
+        runs: Each.
+        names: What the endings are called, in the order of their shares.
+    """
+
+    runs: Sequence[Endings]
+    names: Sequence[str]
+
+    def rows(self) -> Iterator[Mapping[str, object]]:
+        """Yield a row for each stretch of each training, and one for each greedy policy."""
+        for run in self.runs:
+            for episode, shares in zip(run.episodes.tolist(), run.shares.T.tolist(), strict=True):
+                named = dict(zip(self.names, shares, strict=True))
+                yield {"run": run.name, "what": "training", "episode": episode, **named}
+            if run.greedy is not None:
+                named = dict(zip(self.names, run.greedy.tolist(), strict=True))
+                yield {"run": run.name, "what": "greedy", **named}
+
+    @plot_style()
+    def figure(self) -> "Figure":
+        """Draw them.
+
+        Raises:
+            RenderError: matplotlib is not installed.
+        """
+        from matplotlib.figure import Figure  # noqa: PLC0415 - an optional package
+
+        n = len(self.runs)
+        figure = Figure(figsize=(8.6, 1.5 + 2.3 * n), layout="constrained")
+        axes = figure.subplots(n, 2, squeeze=False, width_ratios=(9, 1), sharey=True)
+        for (left, right), run in zip(axes, self.runs, strict=True):
+            self._draw_training(left, run)
+            self._draw_greedy(right, run)
+        axes[-1, 0].set_xlabel("episode")
+        figure.legend(
+            axes[0, 0].collections[::-1], list(self.names)[::-1], loc="outside right upper"
+        )
+        return figure
+
+    def _draw_training(self, axes: "Axes", run: Endings) -> None:
+        edges = np.concatenate([[0], run.episodes])
+        tops = np.cumsum(run.shares, axis=0)
+        bottoms = tops - run.shares
+        for number, (low, high) in enumerate(zip(bottoms, tops, strict=True)):
+            axes.fill_between(
+                edges,
+                np.append(low, low[-1]),
+                np.append(high, high[-1]),
+                step="post",
+                **_look(number),
+            )
+        axes.set_title(short(run.name, 60), fontsize="medium")
+        axes.set(xlim=(0, edges[-1]), ylim=(0, 1))
+        axes.xaxis.set_major_formatter("{x:,.0f}")
+        axes.yaxis.set_major_formatter(lambda share, _: f"{share:.0%}")
+        axes.grid(visible=False)
+
+    def _draw_greedy(self, axes: "Axes", run: Endings) -> None:
+        axes.set_title("greedy", fontsize="medium")
+        axes.set_xticks([])
+        axes.grid(visible=False)
+        if run.greedy is None:
+            axes.set_facecolor(css(MISSING))
+            return
+        for number, (top, share) in enumerate(zip(np.cumsum(run.greedy), run.greedy, strict=True)):
+            axes.bar(0, share, 1, top - share, **_look(number))
+
+
+def _look(number: int) -> dict[str, Any]:
+    """Return colours and, for print without them, hatches of an ending."""
+    colour = (CURVES[4], CURVES[1], CURVES[5], CURVES[0], CURVES[2])[number % 5]
+    hatch = ("///", "\\\\\\", "...", "xxx", "")[number % 5]
+    return {"facecolor": css(colour), "edgecolor": css(INK), "hatch": hatch, "linewidth": 0.3}
+
+
+def stretches(n: int, most: int) -> npt.NDArray[np.int64]:
+    """Return the ends of at most so many equal stretches of n episodes."""
+    return np.unique(np.linspace(0, n, min(n, most) + 1).round().astype(np.int64))[1:]

@@ -1,0 +1,190 @@
+"""Plots of runs: what they were like to learn, what was learned, and how long it lasts.
+
+Each function returns numbers that can be drawn (`media.plots.Plot`): `figure()` draws them with
+matplotlib, `rows()` has exactly what is drawn.
+"""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final, Literal
+
+import numpy as np
+
+from mjcartpole.errors import ConfigError, check_known
+from mjcartpole.learning.episodes import ENDINGS
+from mjcartpole.learning.evaluation import EPISODES, evaluate
+from mjcartpole.learning.slices import SHOWN, choose_axes, names_of, slices
+from mjcartpole.media.curve_plot import Curves
+from mjcartpole.media.endings_plot import Endings, EndingsPlot, stretches
+from mjcartpole.media.grid_plot import Grid, Kind
+from mjcartpole.media.grid_plot import Path as PlanePath
+from mjcartpole.media.plots import Plot
+from mjcartpole.studies.basin import basin, limit_along
+from mjcartpole.studies.film import play
+from mjcartpole.studies.policy_setup import PolicySetup, find_setup
+from mjcartpole.studies.run_curves import Group, curves_of, read_groups
+from mjcartpole.studies.statistics import Average
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+PHASES: Final = 3
+"""Episodes in the phase plane."""
+STRETCHES: Final = 50
+"""Of a training whose endings are counted."""
+
+At = Mapping[str, float]
+Kinds = Literal["curve", "table", "basin", "phase", "endings"]
+
+
+def plot(kind: Kinds, *runs: str | Path, **options: Any) -> "Figure":  # noqa: ANN401
+    """Draw runs with matplotlib.
+
+    >>> plot("curve", "runs/tuned-mujoco-seed0").savefig("curve.png")  # doctest: +SKIP
+
+    Args:
+        kind: `curve`, `table`, `basin`, `phase` or `endings`.
+        runs: Run folders: one, but for curves and endings; or a policy file, but for these.
+        options: See the function of that kind.
+
+    Raises:
+        MjCartPoleError: A run cannot be used, or an option makes no sense.
+    """
+    return numbers(kind, [Path(run) for run in runs], **options).figure()
+
+
+def numbers(kind: Kinds, runs: Sequence[Path], **options: Any) -> Plot:  # noqa: ANN401
+    """Return what is drawn of runs; see `plot`."""
+    check_known("kind of plot", kind, (*OF_SEVERAL, *OF_ONE))
+    if not runs:
+        raise ConfigError(f"plot {kind} needs a run folder")
+    if kind in OF_SEVERAL:
+        return OF_SEVERAL[kind](runs, **options)
+    if len(runs) > 1:
+        raise ConfigError(f"plot {kind} is for one run, not {len(runs)}")
+    return OF_ONE[kind](find_setup(runs[0]), **options)
+
+
+def curve(
+    folders: Iterable[Path], *, window: int | None = None, average: Average = "mean"
+) -> Curves:
+    """Return learning curves; runs that differ by their seed alone are one line with a band.
+
+    Args:
+        folders: Run folders, and folders of many seeds.
+        window: Episodes of the running mean; a fortieth of the longest run if left out.
+        average: What many seeds are drawn as, beside its 95 % bootstrap interval.
+
+    Raises:
+        RunError: A run is damaged, or no episode of it is finished.
+        ConfigError: The window makes no sense.
+    """
+    return curves_of(read_groups(folders), window=window, average=average)
+
+
+def table(
+    setup: PolicySetup,
+    *,
+    dims: Sequence[str] = (),
+    over: str | None = None,
+    at: At | None = None,
+    shown: Sequence[Kind] = SHOWN,
+) -> Grid:
+    """Return slices of a table: greedy action, advantage and visits.
+
+    Args:
+        setup: Whose; `find_setup` makes one of a run folder or a policy file.
+        dims: See `choose_axes`.
+        over: See `choose_axes`.
+        at: See `choose_axes`.
+        shown: What: a row each.
+
+    Raises:
+        ConfigError: There is no such dimension, or one is asked for twice.
+    """
+    policy = setup.policy
+    axes = choose_axes(policy.discretizer, dims, over, at)
+    a, b = (limit_along(dimension, setup.task) for dimension in axes.dims)
+    return slices(setup.name, policy.discretizer, policy.q_table, axes, shown=shown, limits=(a, b))
+
+
+def phase(
+    setup: PolicySetup,
+    *,
+    dims: Sequence[str] = (),
+    at: At | None = None,
+    episodes: int = PHASES,
+) -> Grid:
+    """Return greedy episodes in a plane, over the action that the table has there.
+
+    Args:
+        setup: The policy and where it is played.
+        dims: See `choose_axes`.
+        at: See `choose_axes`; the episodes themselves are not held.
+        episodes: How many: the first that an evaluation with the same seed plays.
+
+    Raises:
+        ConfigError: There is no such dimension, or no episode.
+        SimulationError: The physics diverged.
+    """
+    policy = setup.policy
+    axes = choose_axes(policy.discretizer, dims, "none", at)
+    takes = play(setup, episodes)
+    paths = [
+        PlanePath(take.states[:, axes.dims], take.episode.ending, take.episode.ending == ENDINGS[0])
+        for take in takes
+    ]
+    a, b = (limit_along(dimension, setup.task) for dimension in axes.dims)
+    names = names_of(policy.discretizer)
+    drawn = slices(setup.name, policy.discretizer, policy.q_table, axes, shown=("action",))
+    return Grid(
+        drawn.title,
+        (names[axes.dims[0]], names[axes.dims[1]]),
+        drawn.fields,
+        paths,
+        (a, b),
+        notes=[f"{len(paths)} episodes: from a dot to a square (time limit) or a cross"],
+    )
+
+
+def endings(folders: Iterable[Path], *, episodes: int = EPISODES) -> EndingsPlot:
+    """Return how episodes ended along trainings, and how those of the greedy policies do.
+
+    Args:
+        folders: Run folders, and folders of many seeds.
+        episodes: Greedy episodes of each policy.
+
+    Raises:
+        RunError: A run is damaged, or no episode of it is finished.
+        SimulationError: The physics diverged.
+    """
+    groups = read_groups(folders)
+    return EndingsPlot([_endings(group, episodes) for group in groups], ENDINGS[::-1])
+
+
+def _endings(group: Group, episodes: int) -> Endings:
+    name, records = group
+    n = max(len(record.columns.totals) for record in records)
+    ends = stretches(n, STRETCHES)
+    counts = np.zeros((len(ENDINGS), len(ends)))
+    for record in records:
+        stretch = np.searchsorted(ends, np.arange(1, len(record.columns.totals) + 1))
+        np.add.at(counts, (len(ENDINGS) - 1 - record.columns.endings, stretch), 1)
+    greedy = np.zeros(len(ENDINGS))
+    for record in records:
+        setup = find_setup(record.folder)
+        played = evaluate(
+            setup.policy,
+            backend=setup.backend,
+            model=setup.model,
+            integrator=setup.integrator,
+            task=setup.task,
+            episodes=episodes,
+            seed=setup.seed,
+        )
+        greedy += list(played.endings.values())[::-1]
+    return Endings(name, ends, counts / counts.sum(axis=0), greedy / greedy.sum())
+
+
+OF_SEVERAL: Final[Mapping[str, Callable[..., Plot]]] = {"curve": curve, "endings": endings}
+OF_ONE: Final[Mapping[str, Callable[..., Plot]]] = {"table": table, "basin": basin, "phase": phase}
