@@ -12,7 +12,8 @@ from mjcartpole.learning.discretizer import Discretizer
 from mjcartpole.learning.policy import Policy
 from mjcartpole.page.run_data import Picture, Told, packed, run_data
 from mjcartpole.physics.load import load_model
-from mjcartpole.studies.film import PolicySetup, play
+from mjcartpole.studies.film import play
+from mjcartpole.studies.policy_setup import PolicySetup
 from mjcartpole.task import Task
 
 GRID = Discretizer((1, 1, 2, 2), (-2.4, -1.0, -0.2, -1.0), (2.4, 1.0, 0.2, 1.0))

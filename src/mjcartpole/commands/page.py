@@ -7,17 +7,17 @@ from typing import TYPE_CHECKING, Any
 
 from mjcartpole.commands.options import (
     Command,
-    EvalTarget,
     Included,
     OutputPath,
     Policies,
     UsageError,
 )
 from mjcartpole.files import check_free, check_writable, write_whole
+from mjcartpole.studies.eval_target import EvalTarget
 
 if TYPE_CHECKING:
     from mjcartpole.page.run_data import Told
-    from mjcartpole.studies.film import PolicySetup
+    from mjcartpole.studies.policy_setup import PolicySetup
 
 
 @dataclass(frozen=True)

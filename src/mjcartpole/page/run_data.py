@@ -14,7 +14,8 @@ import numpy.typing as npt
 from mjcartpole.files import read_bytes
 from mjcartpole.learning.policy import Policy
 from mjcartpole.physics.cartpole import CartPole
-from mjcartpole.studies.film import PolicySetup, play
+from mjcartpole.studies.film import play
+from mjcartpole.studies.policy_setup import PolicySetup
 from mjcartpole.task import CONTROL_STEP, Task
 
 _MOST_BYTES: Final = 2**26
