@@ -14,7 +14,7 @@ class RunLocation:
     """What a run is called and where it goes."""
 
     preset: str = "tuned"
-    """Where the defaults below come from: tuned, article, article-terminal, two-poles,
+    """Where the defaults below come from: tuned, article, article-terminal, two-poles, wieland,
     damped, quick or planned."""
     run_dir: Path | None = None
     """Folder for the run; runs/<preset>-<backend>-<what was changed>-seed<seed> if left out."""

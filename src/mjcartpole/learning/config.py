@@ -142,8 +142,7 @@ class TrainConfig:
         With another method than its own, a preset gives what that method has of it.
 
         Args:
-            name: `tuned`, `article`, `article-terminal`, `two-poles`, `damped`, `quick` or
-                `planned`.
+            name: One of `PRESETS`.
             changes: Any field of the config.
 
         Raises:

@@ -58,6 +58,17 @@ _TWO_POLES: dict[str, Any] = {
     "td_lambda": 0.95,
     "log_every": 1_500,
 }
+# At 0.02 s one push throws the short pole too far; as many seconds as 500 steps of these.
+_WIELAND: dict[str, Any] = {
+    **_TWO_POLES,
+    "model": "wieland",
+    "own_timestep": True,
+    "max_episode_steps": 1_000,
+    "episodes": 6_000,
+    "low": (-2.0, -0.75, -0.1, -0.4, -0.2095, -3.0),
+    "high": (2.0, 0.75, 0.1, 0.4, 0.2095, 3.0),
+    "log_every": 600,
+}
 # Values drawn at random leave no ties: what acts while learning is the greedy policy itself.
 _QUICK: dict[str, Any] = {
     "method": "model",
@@ -103,6 +114,7 @@ PRESETS: Final[dict[str, dict[str, Any]]] = {
     "article": _ARTICLE,
     "article-terminal": {**_ARTICLE, "learn_last_step": True},
     "two-poles": _TWO_POLES,
+    "wieland": _WIELAND,
     "damped": _DAMPED,
     "quick": _QUICK,
     "planned": _PLANNED,
