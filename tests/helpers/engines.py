@@ -8,6 +8,13 @@ import textwrap
 import numpy as np
 
 from mjcartpole.errors import SimulationError
+from mjcartpole.learning.checkpoints import (
+    LATEST,
+    Checkpoint,
+    checksum,
+    load_checkpoint,
+    save_checkpoint,
+)
 from mjcartpole.learning.discretizer import Discretizer
 from mjcartpole.learning.policy import Policy
 from mjcartpole.learning.training import Training
@@ -63,6 +70,11 @@ def outcome(config, engine, cartpole=None):
     """All that a training comes to, as bytes; where it diverges, up to there."""
     training = Training(config, engine=engine, cartpole=cartpole)
     assert training.engine == engine
+    return outcome_of(training)
+
+
+def outcome_of(training):
+    """Train to the end; return all that it comes to."""
     error = None
     try:
         for finished in training.run():
@@ -79,6 +91,19 @@ def outcome(config, engine, cartpole=None):
         "policy": training.result().policy.choices.tolist(),
         "error": error,
     }
+
+
+def resumed(config, engines, episode, folder):
+    """Return a training that one engine left after an episode and another takes from the disk."""
+    first, second = (Training(config, engine=engine) for engine in engines)
+    if first.engine == "compiled":
+        first._loop._chunk = 1  # It looks up after each episode.
+    run = first.run()
+    while len(first.log) < episode:
+        next(run)
+    save_checkpoint(folder, Checkpoint(config, checksum(REFERENCE), first.snapshot()))
+    second.restore(load_checkpoint(folder / LATEST, config, REFERENCE).snapshot)
+    return second
 
 
 def write(tmp_path, text, name="model.xml"):

@@ -66,6 +66,56 @@ class Slippery:
         return float(s), min(s_next, self.n - 1), s_next == self.n
 
 
+class Cliff:
+    """A grid from whose lower left corner one goes to the lower right one; between them is a cliff.
+
+    Sutton and Barto, example 6.6: a move costs 1, a fall 100 and leads back to the start. A move
+    is two choices here: along the cliff (0) or across (1), then back (0) or forth (1). A cell has
+    three states: before the first, and before the second of either kind.
+    """
+
+    start = 0
+
+    def __init__(self, length, width):
+        self.length, self.width = length, width
+        self.n = 3 * length * width
+
+    def step(self, s, a, rng):
+        cell, chosen = divmod(s, 3)
+        if chosen == 0:
+            return 0.0, s + 1 + a, False
+        y, x = divmod(cell, self.length)
+        x += (2 * a - 1) * (chosen == 1)
+        y += (2 * a - 1) * (chosen == 2)
+        x, y = min(max(x, 0), self.length - 1), min(max(y, 0), self.width - 1)
+        if y == 0 and 0 < x < self.length - 1:
+            return -100.0, self.start, False
+        return -1.0, 3 * (self.length * y + x), (x, y) == (self.length - 1, 0)
+
+    def way(self, table):
+        """Return how far from the cliff a greedy walk is in each column, at most."""
+        s, far, over = self.start, [0] * self.length, False
+        for _ in range(2 * self.n):
+            if over:
+                return far
+            _, s, over = self.step(s, int(table[s][1] > table[s][0]), None)
+            y, x = divmod(s // 3, self.length)
+            far[x] = max(far[x], y)
+        return None
+
+    def values(self, epsilon):
+        """Return the values of who acts best but for a share of random actions, shape (n, 2)."""
+        steps = [[self.step(s, a, None) for a in (0, 1)] for s in range(self.n)]
+        rewards, leads, over = (
+            np.array([[e[i] for e in pair] for pair in steps]) for i in range(3)
+        )
+        q = np.zeros((self.n, 2))
+        for _ in range(5_000):
+            state = (1 - epsilon) * q.max(axis=1) + epsilon * q.mean(axis=1)
+            q = rewards + np.where(over, 0.0, state[leads])
+        return q
+
+
 class Corridor:
     """Three places that look alike, at the middle one left is right; it costs 1 a step to its end.
 

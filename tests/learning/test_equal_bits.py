@@ -7,6 +7,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from configs import TASKS, configs
 from engines import (
     DIVERGING,
     ENGINES,
@@ -14,10 +15,13 @@ from engines import (
     TOUCHING,
     edited,
     outcome,
+    outcome_of,
     random_policy,
+    resumed,
     to,
     write,
 )
+from mjcartpole import task
 from mjcartpole.errors import SimulationError
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.evaluation import evaluate
@@ -89,47 +93,31 @@ FEW = ("reference", "fifths of steps", "RK4", "contacts", "another cart-pole")
 """Of all models, those whose steps differ most."""
 
 
-@st.composite
-def configs(draw):
-    fractions = st.floats(0, 1)
-    schedules = st.sampled_from([0.0, 0.01, 0.1, 1.0]) | fractions
-    low = draw(st.tuples(*[st.floats(-3, 0)] * 4))
-    width = draw(st.tuples(*[st.floats(1e-3, 5)] * 4))
-    mirror = draw(st.booleans())
-    high = tuple(a + b for a, b in zip(low, width, strict=True))
-    q_init = sorted(draw(st.tuples(*[st.sampled_from([0.0, 1.0, 60.0]) | st.floats(-99, 99)] * 2)))
-    physics = draw(st.sampled_from([("gym", "gym"), ("mujoco", "gym"), ("mujoco", "mujoco")]))
-    return TrainConfig(
-        backend=physics[0],
-        integrator=physics[1],
-        episodes=draw(st.integers(1, 40)),
-        max_episode_steps=draw(st.none() | st.integers(1, 60)),
-        seed=draw(st.integers(0, 9) | st.integers(0, 2**70)),
-        bins=draw(st.tuples(*[st.sampled_from([1, 1, 2, 3, 8]) | st.integers(1, 14)] * 4)),
-        # For each number of axes tiles are compiled anew.
-        tilings=draw(st.sampled_from(at_night([1, 1, 1, 2, 8], fast=[1]))),
-        low=tuple(-each for each in width) if mirror else low,
-        high=width if mirror else high,
-        mirror=mirror,
-        gamma=draw(st.sampled_from([0.0, 0.95, 1.0]) | fractions),
-        alpha=draw(schedules),
-        alpha_final=draw(schedules),
-        epsilon=draw(schedules),
-        epsilon_final=draw(schedules),
-        decay=draw(st.sampled_from([0.0, 0.5, 1.0, 0, 1]) | fractions),
-        q_init_low=q_init[0],
-        q_init_high=q_init[1],
-        td_lambda=draw(st.sampled_from([None, None, 0.0, 1.0, 0, 1]) | fractions),
-        ties=draw(st.sampled_from(["first", "random"])),
-        learn_last_step=draw(st.booleans()),
-    )
+@pytest.fixture(autouse=True, scope="module")
+def _tasks():
+    """The tasks that are drawn, for as long as they are."""
+    for each in TASKS.values():
+        task.register(each)
+    yield
+    for each in TASKS.values():
+        if each is not task.CARTPOLE_V1:
+            del task.TASKS[each.name]
 
 
-@given(configs())
-@settings(examples(60), suppress_health_check=list(HealthCheck))
-def test_any_config_gives_the_same_bits(config):
+# The others take seconds each to compile; their parts are compared in test_kernels.py.
+@given(
+    configs(at_night(tuple(METHODS), fast=("q-learning",))),
+    st.floats(0, 1),
+    st.tuples(*[st.sampled_from(ENGINES)] * 2),
+)
+@settings(
+    max_examples=at_night(300, fast=10), suppress_health_check=list(HealthCheck), deadline=None
+)
+def test_any_config_gives_the_same_bits_also_resumed(tmp_path, config, share, engines):
     found = assert_engines_agree(config)
     assert len(found["returns"]) == config.episodes
+    episode = round(share * config.episodes)
+    assert outcome_of(resumed(config, engines, episode, tmp_path)) == found
 
 
 @pytest.mark.parametrize(
