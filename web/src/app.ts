@@ -1,13 +1,16 @@
-/** The page: a run at a time, on the stage, with its table and what it came to. */
+/** The page: a run at a time, on the stage, with its table, its model and what it came to. */
 import { type CartPole, loadCartPole, type Loader } from "./cartpole";
 import { bytesOf, numbersOf, type PageData, type RunData } from "./data";
 import { choice, make } from "./dom";
 import type { Mujoco } from "./engine";
-import { parityText, replay, type Parity } from "./parity";
+import { ModelPanel } from "./model_panel";
+import { type Parity, parityText, replay } from "./parity";
 import { Play } from "./play";
 import { Policy } from "./policy";
+import { creditsOf, resultsOf, runsTable } from "./results";
 import { Simulation } from "./simulation";
 import { Stage } from "./stage";
+import { TablePanel } from "./table_panel";
 
 declare global {
   interface Window {
@@ -16,32 +19,41 @@ declare global {
   }
 }
 
+const OTHER = "another pole than the one that was recorded: parity does not apply";
+const GYM = "Trained on gymnasium's own CartPole-v1, and played here on the reference MJCF under explicit Euler, which is the same motion but for rounding.";
+
 export class App {
   readonly element: HTMLElement;
   readonly stage: Stage | null = null;
   readonly mujoco: Mujoco | null = null;
   run!: RunData;
   policy!: Policy;
-  cartpole!: CartPole;
   parity: Parity | null = null;
+  model: ModelPanel | null = null;
   isReady = false;
-  private loader!: Loader;
   private readonly badge = make("p", { class: "parity", role: "status" });
+  private readonly top = make("div", { class: "top" });
+  private readonly below = make("div", { class: "below" });
+  private readonly about = make("p", { class: "note", hidden: true });
+  private readonly switches: HTMLSelectElement | null;
 
   constructor(
     readonly data: PageData,
     engine: Mujoco | string,
   ) {
     const runs = data.runs.map((run, i): [string, string] => [String(i), run.name]);
-    const head = make("header", {}, make("h1", {}, "mjcartpole"),
-      runs.length > 1 ? choice("Run", runs, (value) => void this.show(Number(value))) : make("p", {}, data.runs[0].name), this.badge);
-    this.element = make("main", {}, head);
+    const name = runs.length > 1 ? choice("Run", runs, (value) => void this.show(Number(value))) : make("p", {}, data.runs[0].name);
+    this.switches = name.querySelector("select");
+    this.element = make("main", {}, make("header", {}, make("h1", {}, "mjcartpole"), name, this.badge), this.about);
     if (typeof engine === "string") this.element.append(make("p", { class: "alert", role: "alert" }, engine));
     else {
       this.mujoco = engine;
       this.stage = new Stage(engine);
-      this.element.append(this.stage.element);
+      this.top.append(this.stage.element);
     }
+    this.element.append(this.top, this.below);
+    if (runs.length > 1) this.element.append(runsTable(data, (index) => void this.show(index)));
+    this.element.append(creditsOf(data));
     window.mjcartpole = this;
   }
 
@@ -49,21 +61,55 @@ export class App {
   async show(index: number): Promise<void> {
     this.isReady = false;
     this.run = this.data.runs[index];
+    if (this.switches) this.switches.value = String(index);
     this.policy = new Policy(this.run.grid, await numbersOf(this.run.table));
-    if (this.mujoco && this.stage) {
-      this.loader = { mujoco: this.mujoco, files: filesOf(this.mujoco, this.run), ownTimestep: this.run.own_timestep };
-      this.cartpole = loadCartPole(this.loader, this.run.document, this.run.parts);
-      await this.check(this.mujoco);
-      this.stage.show(new Play(this.mujoco, this.cartpole, this.run.integrator, this.run.task, this.policy));
-    }
+    this.about.textContent = GYM;
+    this.about.hidden = this.run.backend !== "gym";
+    const panel = new TablePanel(this.policy, this.run.parts.hinges.length);
+    this.top.querySelector(".table")?.remove();
+    this.top.append(panel.element);
+    this.below.replaceChildren(...resultsOf(this.run));
+    if (this.mujoco && this.stage) await this.begin(this.mujoco, this.stage, panel);
+    else panel.showAlone(this.run.parts.hinges.length);
     this.isReady = true;
   }
 
-  private async check(mujoco: Mujoco): Promise<void> {
-    const simulation = new Simulation(mujoco, this.cartpole, this.run.integrator);
+  private async begin(mujoco: Mujoco, stage: Stage, panel: TablePanel): Promise<void> {
+    const loader: Loader = { mujoco, files: filesOf(mujoco, this.run), ownTimestep: this.run.own_timestep };
+    const own = loadCartPole(loader, this.run.document, this.run.parts);
+    await this.check(mujoco, own);
+    this.model = new ModelPanel(loader, own);
+    this.model.onModel = (cartpole, isOwn) => this.change(mujoco, stage, cartpole, isOwn);
+    this.below.prepend(this.model.element);
+    panel.onStart = (state) => stage.restart(state);
+    stage.onFrame = (play, now) => panel.show(play, now);
+    stage.show(new Play(mujoco, own, this.run.integrator, this.run.task, this.policy));
+  }
+
+  /** Play on with another model, from the state that there is. */
+  private change(mujoco: Mujoco, stage: Stage, cartpole: CartPole, isOwn: boolean): void {
+    const { state, player, timed } = stage.play;
+    const play = new Play(mujoco, cartpole, this.run.integrator, this.run.task, this.policy);
+    Object.assign(play, { player, timed });
+    play.restart(state);
+    stage.show(play);
+    this.tell(isOwn);
+  }
+
+  /** Replay the recorded episode, and say what came of it. */
+  private async check(mujoco: Mujoco, own: CartPole): Promise<void> {
+    const simulation = new Simulation(mujoco, own, this.run.integrator);
     this.parity = replay(simulation, this.policy, await numbersOf(this.run.episode.states));
     simulation.delete();
-    this.badge.textContent = parityText(this.parity, this.data.mujoco, mujoco.mj_versionString());
+    this.tell(true);
+  }
+
+  private tell(isOwn: boolean): void {
+    if (!this.parity || !this.mujoco) return;
+    const text = parityText(this.parity, this.data.mujoco, this.mujoco.mj_versionString());
+    this.badge.textContent = isOwn ? text : OTHER;
+    this.badge.classList.toggle("equal", isOwn && this.parity.firstApart === null);
+    this.badge.classList.toggle("other", !isOwn);
   }
 }
 

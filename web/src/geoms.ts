@@ -1,7 +1,7 @@
 /** The geoms of a model as meshes of three.js. */
 import {
   BoxGeometry, BufferAttribute, BufferGeometry, CapsuleGeometry, Color, CylinderGeometry, DoubleSide, Mesh,
-  MeshPhongMaterial, PlaneGeometry, SphereGeometry,
+  MeshLambertMaterial, PlaneGeometry, SphereGeometry,
 } from "three";
 import { GEOM, type MjModel } from "./engine";
 import { row, type Vector } from "./vectors";
@@ -10,7 +10,7 @@ export interface Drawn {
   geom: number;
   body: number;
   moves: boolean;
-  mesh: Mesh<BufferGeometry, MeshPhongMaterial>;
+  mesh: Mesh<BufferGeometry, MeshLambertMaterial>;
 }
 
 const FAR = 100;
@@ -72,15 +72,12 @@ function darkened([r, g, b, a]: Vector, moves: boolean): Vector {
   return light < 0.35 && Math.max(r, g, b) - Math.min(r, g, b) < 0.2 ? [r + 0.16, g + 0.17, b + 0.19, a] : [r, g, b, a];
 }
 
-function materialOf(model: MjModel, geom: number, [r, g, b, a]: Vector): MeshPhongMaterial {
+function materialOf(model: MjModel, geom: number, [r, g, b, a]: Vector): MeshLambertMaterial {
   const material = model.geom_matid[geom];
-  const specular = material < 0 ? 0.5 : model.mat_specular[material];
   const emission = material < 0 ? 0 : model.mat_emission[material];
-  return new MeshPhongMaterial({
+  return new MeshLambertMaterial({
     color: new Color(r, g, b),
-    specular: new Color(specular, specular, specular).multiplyScalar(0.5),
     emissive: new Color(r, g, b).multiplyScalar(emission),
-    shininess: 40,
     opacity: a,
     transparent: a < 1,
     side: DoubleSide,

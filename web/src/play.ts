@@ -25,8 +25,6 @@ export class Play {
   player: Player = "table";
   /** Whether the time limit ends an episode of the table. */
   timed = false;
-  /** The last push along the rail, N. */
-  push = 0;
   best = 0;
   private due = 0;
 
@@ -52,7 +50,7 @@ export class Play {
   /** Start again, from a state or from a drawn one. */
   restart(state: number[] = drawnStart(this.task, this.simulation.state.length)): void {
     this.simulation.state = state;
-    this.steps = this.due = this.push = this.rivalSteps = 0;
+    this.steps = this.due = this.rivalSteps = 0;
     this.ending = this.rivalEnding = null;
     this.rival?.delete();
     this.rival = this.player === "you" ? new Simulation(this.mujoco, this.cartpole, this.integrator) : null;
@@ -76,7 +74,7 @@ export class Play {
   /** Take one control step. */
   step(): void {
     if (this.ending === null) {
-      this.push = this.stepWith(this.simulation, this.control(), true);
+      this.stepWith(this.simulation, this.control(), true);
       this.steps += 1;
       this.ending = this.endingAfter(this.simulation, this.steps);
       if (this.player === "you") this.best = Math.max(this.best, this.steps);
@@ -95,9 +93,13 @@ export class Play {
     return this.keys === 0 ? 0 : controls[this.keys > 0 ? 1 : 0];
   }
 
-  private stepWith(simulation: Simulation, control: number, isMine: boolean): number {
+  private stepWith(simulation: Simulation, control: number, isMine: boolean): void {
     simulation.step(control, isMine && this.isDisturbed ? () => this.disturb() : undefined);
-    return pushOf(this.cartpole.model, this.cartpole.slider, control);
+  }
+
+  /** The push along the rail that comes next, N. */
+  get nextPush(): number {
+    return pushOf(this.cartpole.model, this.cartpole.slider, this.control());
   }
 
   private get isDisturbed(): boolean {

@@ -16,6 +16,8 @@ ColorManagement.enabled = false;
 const ACTION = new Color(0 / 255, 146 / 255, 118 / 255);
 const GHOST = 0.28;
 const FILM_ASPECT = 4 / 3;
+/** How much of a film's height a wider picture shows at least. */
+const CLOSEST = 0.87;
 const NEAR_ENOUGH = [0, 10, 20, 30];
 
 export interface Grip {
@@ -121,7 +123,7 @@ export class Scene {
     this.camera.aspect = size.x / size.y;
     const isFree = index < 0 || index >= model.ncam;
     const fovy = isFree ? this.frameTrack() : this.throughCamera(index);
-    const half = Math.tan((fovy * Math.PI) / 360) * Math.max(1, FILM_ASPECT / this.camera.aspect);
+    const half = Math.tan((fovy * Math.PI) / 360) * Math.max(CLOSEST, FILM_ASPECT / this.camera.aspect);
     this.camera.fov = (Math.atan(half) * 360) / Math.PI;
     this.camera.updateProjectionMatrix();
     this.camera.updateMatrixWorld(true);

@@ -22,7 +22,7 @@ export class Stage {
   paused = wantsStillness();
   speed = 1;
   /** Called after each picture. */
-  onFrame: (play: Play) => void = () => undefined;
+  onFrame: (play: Play, now: number) => void = () => undefined;
   /** Called when somebody else is to push. */
   onPlayer: () => void = () => undefined;
   private scene!: Scene;
@@ -48,10 +48,12 @@ export class Stage {
     const speed = choice("Speed", SPEEDS, (value) => { this.speed = Number(value); });
     const bar = make("div", { class: "bar" },
       this.playButton, button("Step", "One control step (S)", () => this.stepOnce()),
-      button("Restart", "Start again from a new state (R)", () => this.restart()), this.youButton, speed,
-      make("label", { class: "choice" }, make("span", {}, "Camera"), this.cameras));
+      button("Restart", "Start again from a new state (R)", () => this.restart()), this.youButton, this.hands());
+    const more = make("div", { class: "bar" },
+      make("p", { class: "hint" }, "Drag the pole or the cart; arrow keys push."),
+      speed, make("label", { class: "choice" }, make("span", {}, "Camera"), this.cameras));
     const view = make("div", { class: "view" }, this.canvas, this.score, this.said);
-    this.element = make("div", { class: "stage" }, view, bar, this.hands());
+    this.element = make("div", { class: "stage" }, view, bar, more);
     this.listen();
     new ResizeObserver(() => this.resize()).observe(view);
     requestAnimationFrame((time) => this.frame(time));
@@ -64,8 +66,7 @@ export class Stage {
       const up = () => { this.play.keys = 0; };
       return make("button", { type: "button", class: "hand", "aria-label": label, pointerdown: down, pointerup: up, pointerleave: up, pointercancel: up }, text);
     };
-    const hint = make("p", { class: "hint" }, "Drag the pole or the cart. Arrow keys push.");
-    return make("div", { class: "hands" }, hand("◀", "Push to the left", -1), hint, hand("▶", "Push to the right", 1));
+    return make("div", { class: "hands" }, hand("◀", "Push to the left", -1), hand("▶", "Push to the right", 1));
   }
 
   /** Show another game. */
@@ -118,7 +119,7 @@ export class Stage {
     if (!this.play) return;
     if (!this.paused) this.move(seconds);
     this.draw();
-    this.onFrame(this.play);
+    this.onFrame(this.play, time);
   }
 
   private move(seconds: number): void {
@@ -131,7 +132,7 @@ export class Stage {
 
   draw(): void {
     const { play } = this;
-    this.scene.draw(play.state, play.rival?.state ?? null, play.ending === null ? play.push : 0, play.pull?.ends ?? null);
+    this.scene.draw(play.state, play.rival?.state ?? null, play.ending === null ? play.nextPush : 0, play.pull?.ends ?? null);
     this.playButton.textContent = this.paused ? "Play" : "Pause";
     const text = this.words();
     if (this.said.textContent !== text) this.said.textContent = text;
@@ -164,6 +165,8 @@ export class Stage {
   private listen(): void {
     const { canvas } = this;
     canvas.addEventListener("pointerdown", (event) => this.grab(event));
+    // What is grabbed does not scroll the page; what is not does.
+    canvas.addEventListener("touchstart", (event) => { if (this.play.pull) event.preventDefault(); }, { passive: false });
     canvas.addEventListener("pointermove", (event) => this.drag(event));
     for (const name of ["pointerup", "pointercancel"]) canvas.addEventListener(name, () => this.release());
     addEventListener("keydown", (event) => this.key(event, true));
