@@ -10,7 +10,8 @@ import pytest
 
 from mjcartpole.learning.discretizer import Discretizer
 from mjcartpole.learning.policy import Policy
-from mjcartpole.page.run_data import Picture, Told, packed, run_data
+from mjcartpole.page.run_data import packed, run_data
+from mjcartpole.page.told import Picture, Told
 from mjcartpole.physics.load import load_model
 from mjcartpole.studies.film import play
 from mjcartpole.studies.policy_setup import PolicySetup
@@ -67,10 +68,10 @@ def test_what_is_told_is_in_words_and_pictures_are_data(tmp_path):
     film.write_bytes(b"film")
     told = Told(
         {"Mean": 499.5}, {"bins": [1, 2], "mirror": None, "set": []},
-        pictures=(Picture("Curve", "It rises", b"<svg/>"),), film=film,
+        pictures=(Picture("Curve", "It rises", "<svg/>"),), film=film,
     )  # fmt: skip
     data = run_data(setup(), told, "mujoco")
     assert data["facts"] == [["Mean", "499.5"]]
     assert data["config"] == [["bins", "1, 2"], ["mirror", "none"], ["set", "none"]]
-    assert data["pictures"][0]["source"] == "data:image/svg+xml;base64,PHN2Zy8+"
+    assert gzip.decompress(base64.b64decode(data["pictures"][0]["svg"])) == b"<svg/>"
     assert data["film"] == "data:video/mp4;base64,ZmlsbQ=="

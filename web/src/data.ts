@@ -32,7 +32,8 @@ export interface GridData {
 export interface PictureData {
   title: string;
   alt: string;
-  source: string;
+  /** Gzipped, in base64. */
+  svg: string;
 }
 
 export interface RunData {

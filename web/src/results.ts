@@ -1,11 +1,10 @@
 /** What a run came to: figures, plots, film, config, versions; of several runs a table. */
-import type { PageData, RunData } from "./data";
+import { type PageData, type PictureData, type RunData, unzipped } from "./data";
 import { make, pairs, section } from "./dom";
 
 /** Return the sections of what a run came to. */
 export function resultsOf(run: RunData): HTMLElement[] {
-  const figures = run.pictures.map(({ title, alt, source }) =>
-    make("figure", {}, make("img", { src: source, alt, loading: "lazy" }), make("figcaption", {}, title)));
+  const figures = run.pictures.map(figureOf);
   const parts: HTMLElement[] = [];
   if (figures.length > 0) parts.push(section("plots", "How it learned, and what it knows", make("div", { class: "figures" }, ...figures)));
   const column = make("div", { class: "column" });
@@ -15,6 +14,15 @@ export function resultsOf(run: RunData): HTMLElement[] {
   if (column.children.length > 0) parts.push(column);
   if (run.film) parts.push(section("film", "The film", filmOf(run)));
   return parts;
+}
+
+/** Return a plot, as an image: an SVG in an image runs no script and loads nothing. */
+function figureOf({ title, alt, svg }: PictureData): HTMLElement {
+  const image = make("img", { alt });
+  void unzipped(svg).then((content) => {
+    image.src = `data:image/svg+xml,${encodeURIComponent(new TextDecoder().decode(content))}`;
+  });
+  return make("figure", {}, make("h3", {}, title), image);
 }
 
 function tiles(facts: [string, string][]): HTMLElement {

@@ -3,7 +3,7 @@
 import dataclasses
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from mjcartpole.commands.options import (
     Command,
@@ -15,8 +15,10 @@ from mjcartpole.commands.options import (
 from mjcartpole.files import check_free, check_writable, write_whole
 from mjcartpole.studies.eval_target import EvalTarget
 
+_MOST: Final = 6_000_000
+"""Bytes of a page with films."""
+
 if TYPE_CHECKING:
-    from mjcartpole.page.run_data import Told
     from mjcartpole.studies.policy_setup import PolicySetup
 
 
@@ -32,21 +34,30 @@ class Page(Command):
     """The file, .html; <name>.html if left out."""
     overwrite: bool = False
     """Replace what is there."""
+    plots: bool = True
+    """Draw the learning curve, the table, the basin and the endings, which takes some seconds."""
 
     def run(self) -> int:
         """Play an episode of each, and write the page; all is checked before anything is played."""
         from mjcartpole.commands.policies import set_up, shown
+        from mjcartpole.media.plots import check_installed
         from mjcartpole.page.document import check_built, page_html
 
         if not self.sources:
             raise UsageError("page needs a RUN-OR-POLICY, or several; see mjcartpole page --help")
         check_built()
+        if self.plots:
+            check_installed()
         sources = [shown(source) for source in self.sources]
         setups = [set_up(source, self.target) for source in sources]
         path = self.output or Path(f"{setups[0].name}.html")
         self._check(path)
-        runs = [_data(*pair) for pair in zip(sources, setups, strict=True)]
+        pairs = zip(sources, setups, strict=True)
+        runs = [_data(source, setup, self.plots) for source, setup in pairs]
         text = page_html(runs)
+        if len(text) > _MOST and any(run["film"] for run in runs):
+            print("page: the films are left out, with which it would be larger than 6 MB")
+            text = page_html([{**run, "film": None} for run in runs])
         write_whole(path, text)
         megabytes = len(text.encode()) / 1e6
         print(f"page  {path}  ({megabytes:.2f} MB; it opens offline, by a double click)")
@@ -60,41 +71,18 @@ class Page(Command):
         check_writable(path.parent)
 
 
-def _data(source: Path, setup: "PolicySetup") -> dict[str, Any]:
+def _data(source: Path, setup: "PolicySetup", plots: bool) -> dict[str, Any]:
     """Return the page's data of a run or a policy; gymnasium's is played on the reference model."""
+    from mjcartpole.commands.films import own_film
+    from mjcartpole.files import is_file
+    from mjcartpole.learning.documents import read_summary
     from mjcartpole.page.run_data import run_data
+    from mjcartpole.page.told import Told, told_of
 
-    backend, told = setup.backend, _told(source)
+    told, backend = Told(), setup.backend
+    if not is_file(source):
+        film = own_film(source, read_summary(source))
+        told = told_of(source, film if film and is_file(film) else None, plots=plots)
     if backend == "gym":
         setup = dataclasses.replace(setup, backend="mujoco", model="cartpole", integrator="gym")
     return run_data(setup, told, backend)
-
-
-def _told(source: Path) -> "Told":
-    """Return what is told of a run; of a policy's file there is nothing."""
-    from mjcartpole.commands.films import own_film
-    from mjcartpole.files import is_file
-    from mjcartpole.learning import runs
-    from mjcartpole.learning.documents import read_summary
-    from mjcartpole.learning.stored import read_document
-    from mjcartpole.page.run_data import Told
-
-    if is_file(source):
-        return Told()
-    run, summary = runs.load_run(source), read_summary(source)
-    film = own_film(source, summary)
-    config = {"preset": run.preset, **run.config.values()}
-    versions = read_document(source / runs.VERSIONS, None, dict, "cannot be read")
-    return Told(_facts(summary), config, versions, (), film if film and is_file(film) else None)
-
-
-def _facts(summary: dict[str, Any]) -> dict[str, Any]:
-    """Return what a run came to, in a person's words."""
-    facts = {"Episodes": summary["episodes"], "Steps of training": summary["steps"]}
-    if played := summary.get("evaluation"):
-        facts["Greedy episodes"] = played["episodes"]
-        facts["Mean greedy return"], facts["Least"] = played["mean"], played["minimum"]
-        facts |= {f"Ended by: {how}": count for how, count in played["endings"].items() if count}
-    if solved := summary.get("solved"):
-        facts["Solved after"] = f"{solved['episodes']} episodes"
-    return facts

@@ -1,10 +1,10 @@
 """What a page needs of a run, as plain values for JSON."""
 
 import base64
+import dataclasses
 import gzip
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
@@ -13,50 +13,14 @@ import numpy.typing as npt
 
 from mjcartpole.files import read_bytes
 from mjcartpole.learning.policy import Policy
+from mjcartpole.page.told import Told
 from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.studies.film import play
 from mjcartpole.studies.policy_setup import PolicySetup
-from mjcartpole.task import CONTROL_STEP, Task
+from mjcartpole.task import CARTPOLE_V1, CONTROL_STEP, Task
 
 _MOST_BYTES: Final = 2**26
-"""Of a file that a model names."""
-
-Table = dict[str, Any]
-"""A row's name and its text."""
-
-
-@dataclass(frozen=True)
-class Picture:
-    """A plot of a run.
-
-    Attributes:
-        title: What it shows.
-        alt: The same for those who do not see it.
-        svg: The picture.
-    """
-
-    title: str
-    alt: str
-    svg: bytes
-
-
-@dataclass(frozen=True)
-class Told:
-    """What is told of a run beside the scene.
-
-    Attributes:
-        facts: What it came to.
-        config: How it was trained.
-        versions: With what.
-        pictures: Its plots.
-        film: Its film, an .mp4 or .gif, if there is one.
-    """
-
-    facts: Table = field(default_factory=dict)
-    config: Table = field(default_factory=dict)
-    versions: Table = field(default_factory=dict)
-    pictures: tuple[Picture, ...] = ()
-    film: Path | None = None
+"""Of a film, or of a file that a model names."""
 
 
 def run_data(setup: PolicySetup, told: Told, backend: str) -> dict[str, Any]:
@@ -72,7 +36,7 @@ def run_data(setup: PolicySetup, told: Told, backend: str) -> dict[str, Any]:
         FileError: A file of the model cannot be read.
         SimulationError: The physics diverged.
     """
-    cartpole, (rollout,) = setup.cartpole, play(setup)
+    cartpole, (rollout,) = setup.cartpole, play(_recorded(setup))
     document, files = cartpole.stored
     return {
         "name": setup.name,
@@ -94,19 +58,26 @@ def run_data(setup: PolicySetup, told: Told, backend: str) -> dict[str, Any]:
         "config": _lines(told.config),
         "versions": _lines(told.versions),
         "pictures": [
-            {"title": each.title, "alt": each.alt, "source": _uri(each.svg, "image/svg+xml")}
+            {"title": each.title, "alt": each.alt, "svg": _zipped(each.svg.encode())}
             for each in told.pictures
         ],
-        "film": told.film and _uri(told.film.read_bytes(), _FILMS[told.film.suffix]),
+        "film": told.film and _film(told.film),
     }
 
 
-_FILMS: Final = {".mp4": "video/mp4", ".gif": "image/gif"}
+def _recorded(setup: PolicySetup) -> PolicySetup:
+    """Return where an episode is played that the page is to play again: no longer than most are."""
+    most = min(setup.task.time_limit, CARTPOLE_V1.time_limit)
+    return dataclasses.replace(setup, task=setup.task.with_time_limit(most))
 
 
 def packed(numbers: npt.NDArray[np.float64]) -> str:
     """Return numbers as text: float64, little endian, gzipped, in base64."""
-    return in_base64(gzip.compress(numbers.astype("<f8").tobytes(), mtime=0))
+    return _zipped(numbers.astype("<f8").tobytes())
+
+
+def _zipped(content: bytes) -> str:
+    return in_base64(gzip.compress(content, mtime=0))
 
 
 def in_base64(content: bytes) -> str:
@@ -114,8 +85,9 @@ def in_base64(content: bytes) -> str:
     return base64.b64encode(content).decode("ascii")
 
 
-def _uri(content: bytes, kind: str) -> str:
-    return f"data:{kind};base64,{in_base64(content)}"
+def _film(path: Path) -> str:
+    kind = "image/gif" if path.suffix == ".gif" else "video/mp4"
+    return f"data:{kind};base64,{in_base64(read_bytes(path, _MOST_BYTES))}"
 
 
 def _content(source: Path | str) -> bytes:
@@ -159,4 +131,6 @@ def _in_words(value: object) -> str:
         return ", ".join(map(_in_words, value)) or "none"
     if value is None or isinstance(value, bool):
         return {None: "none", True: "yes", False: "no"}[value]
+    if isinstance(value, int):
+        return f"{value:,}"
     return f"{value:.12g}" if isinstance(value, float) else str(value)
