@@ -65,7 +65,28 @@ BINS: dict[str, dict[str, Any]] = {
     for preset in ("article", "article-terminal")
     for bins in (10, 25, 50, 100)
 }
-TABLES = {"presets": PRESETS, "variants": VARIANTS, "bins": BINS, "endless": PRESETS}
+
+# What was tried around `endless`.
+AROUND_ENDLESS: dict[str, dict[str, Any]] = {
+    "x not seen": {"bins": (1, 4, 6, 4)},
+    "x_dot not seen": {"bins": (4, 1, 6, 4)},
+    "one grid of 8,8,12,8": {"bins": (8, 8, 12, 8), "tilings": 1, "alpha": 0.1},
+    "no mirror": {"mirror": False},
+    "1,000 episodes": {"episodes": 1_000},
+    "1,000 episodes of 5,000 steps": {"episodes": 1_000, "max_episode_steps": 5_000},
+    "lambda 0.95": {"td_lambda": 0.95},
+    "gamma 0.98": {"gamma": 0.98, "q_init_low": 25.0, "q_init_high": 25.0},
+    "16 grids": {"tilings": 16},
+    "bins 6,4,6,4": {"bins": (6, 4, 6, 4)},
+}
+AROUND_ENDLESS = {name: PRESETS["endless"] | AROUND_ENDLESS[name] for name in AROUND_ENDLESS}
+
+TABLES = {
+    "presets": PRESETS,
+    "variants": VARIANTS,
+    "bins": BINS,
+    "endless": PRESETS | AROUND_ENDLESS,
+}
 
 PART = 50  # starts that are played with one seed
 
@@ -94,7 +115,7 @@ def measure(job: Job) -> dict[str, Any]:
 
 def endless(options: argparse.Namespace, pool: Pool) -> list[dict[str, Any]]:
     """Train every seed, and let its policy play without the task's time limit."""
-    rows, shares = [], []
+    rows: list[dict[str, Any]] = []
     for name, config in make_jobs(options):
         policy = train(config).policy
         parts = [(config, policy, options.steps, part) for part in range(options.starts // PART)]
@@ -105,11 +126,24 @@ def endless(options: argparse.Namespace, pool: Pool) -> list[dict[str, Any]]:
             f"starts last {options.steps:,} steps; shortest {steps.min():,}",
             flush=True,
         )
-        shares.append(lasted / len(steps))
         row = {"name": name, "backend": config.backend, "seed": config.seed}
         rows.append({**row, "lasted": lasted, "starts": len(steps), "shortest": int(steps.min())})
-    print(f"median of {len(rows)} tables {np.median(shares):.1%}, worst {min(shares):.1%}")
+        group = last_group(rows)
+        if len(group) == options.seeds:
+            shares = [each["lasted"] / each["starts"] for each in group]
+            print(
+                f"{name}, {config.backend}: in the median {np.median(shares):.1%} of the starts, "
+                f"mean {np.mean(shares):.1%}, worst seed {min(shares):.1%}, all starts of "
+                f"{sum(share == 1 for share in shares)} of {len(shares)} seeds",
+                flush=True,
+            )
     return rows
+
+
+def last_group(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """The figures of one preset on one backend so far: of the latest."""
+    name, backend = rows[-1]["name"], rows[-1]["backend"]
+    return [row for row in rows if (row["name"], row["backend"]) == (name, backend)]
 
 
 def play_on(part: tuple[TrainConfig, Policy, int, int]) -> npt.NDArray[np.int64]:
@@ -167,7 +201,7 @@ def reliability(options: argparse.Namespace, pool: Pool) -> list[dict[str, Any]]
     rows: list[dict[str, Any]] = []
     for row in pool.imap(measure, make_jobs(options)):
         rows.append(row)
-        group = [r for r in rows if (r["name"], r["backend"]) == (row["name"], row["backend"])]
+        group = last_group(rows)
         if len(group) == options.seeds:
             print_group(row["name"], row["backend"], group)
     return rows
