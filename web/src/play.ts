@@ -1,11 +1,11 @@
 /** The game: who pushes, when a step is due, what an episode came to. Nothing of how it looks. */
-import { type CartPole, cartBodies, pushOf } from "./cartpole";
+import { type CartPole, cartBodies, dataAtZero, pushOf } from "./cartpole";
 import type { TaskData } from "./data";
 import type { Mujoco } from "./engine";
 import type { Look, Policy } from "./policy";
 import type { Pull } from "./pull";
 import { drawnStart, endingOf, hasDiverged, type Integrator, Simulation } from "./simulation";
-import type { Vector } from "./vectors";
+import { row, type Vector } from "./vectors";
 
 export type Player = "table" | "you";
 export type Ending = "cart" | "pole" | "time" | "diverged";
@@ -27,6 +27,7 @@ export class Play {
   timed = false;
   best = 0;
   private due = 0;
+  private readonly rail: Vector;
 
   constructor(
     private readonly mujoco: Mujoco,
@@ -36,6 +37,9 @@ export class Play {
     readonly policy: Policy,
   ) {
     this.simulation = new Simulation(mujoco, cartpole, integrator);
+    const zero = dataAtZero(mujoco, cartpole.model);
+    this.rail = row(zero.xaxis, cartpole.slider);
+    zero.delete();
     this.restart();
   }
 
@@ -57,8 +61,14 @@ export class Play {
     if (this.rival) this.rival.state = state;
   }
 
+  /** Whether a contest waits for the visitor's first push. */
+  get isWaiting(): boolean {
+    return this.player === "you" && this.steps === 0 && this.keys === 0 && this.pull === null;
+  }
+
   /** Take as many steps as are due after so many seconds. */
   advance(seconds: number): void {
+    if (this.isWaiting) return;
     this.due = Math.min(this.due + seconds, 0.25);
     while (this.due >= this.simulation.controlStep && !this.isOver) {
       this.due -= this.simulation.controlStep;
@@ -122,8 +132,7 @@ export class Play {
     const { model, slider, controls } = this.cartpole;
     const [cart] = cartBodies(this.cartpole);
     const strength = Math.abs(pushOf(model, slider, controls[1])) * this.keys;
-    const axis: Vector = Array.from(this.simulation.data.xaxis.slice(3 * slider, 3 * slider + 3));
-    axis.forEach((share, i) => { forces[6 * cart + i] += strength * share; });
+    this.rail.forEach((share, i) => { forces[6 * cart + i] += strength * share; });
   }
 
   private endingAfter(simulation: Simulation, steps: number): Ending | null {

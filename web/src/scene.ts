@@ -9,7 +9,7 @@ import { isDark } from "./dom";
 import type { MjData, Mujoco } from "./engine";
 import { Fan } from "./fan";
 import { type Drawn, drawnGeoms } from "./geoms";
-import { add, cross, dot, row, type Vector } from "./vectors";
+import { add, cross, row, type Vector } from "./vectors";
 
 ColorManagement.enabled = false;
 
@@ -192,12 +192,6 @@ export class Scene {
   /** Return where a body's middle is in the world, as last drawn. */
   middleOf(body: number): Vector {
     return row(this.data.xipos, body);
-  }
-
-  /** Return how far a push of the keys goes along the rail: its direction. */
-  get rail(): Vector {
-    const axis = row(this.data.xaxis, this.cartpole.slider);
-    return dot(axis, axis) > 0 ? axis : [1, 0, 0];
   }
 
   delete(): void {

@@ -142,6 +142,7 @@ export class Stage {
 
   private words(): string {
     const { play } = this;
+    if (play.isWaiting) return "Hold ◀ or ▶ to push: it begins with your first push";
     if (play.ending === null) return "";
     const seconds = (play.steps * play.simulation.controlStep).toFixed(1);
     return `${WORDS[play.ending]} after ${play.steps} steps, ${seconds} s`;
