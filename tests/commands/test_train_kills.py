@@ -44,6 +44,17 @@ def test_a_run_that_is_killed_again_and_again_ends_as_if_it_was_not(
     assert_equal_runs("run", slow_reference)
 
 
+def test_a_training_that_is_killed_goes_on_in_the_same_dream(here, fork, capsys):
+    command = [*SLOW, "--method", "identify", "--fit-steps", "20", "--noise", "0.001"]
+    child = fork([*command, "--run-dir", "run", "--checkpoint-every", "0"])
+    wait_until((here / "run" / LATEST).exists, child)
+    child.kill()
+    assert child.wait() == -signal.SIGKILL
+    assert " of 3,000 dreamt episodes" in call(["train", "--resume", "run"], capsys)[1]
+    assert call([*command, "--engine", "compiled", "--run-dir", "whole"], capsys)[0] == 0
+    assert_equal_runs("run", "whole")
+
+
 BEGINNINGS = {
     "one": SHORT,
     "evaluated": [*SHORT, "--evaluate-every", "1"],

@@ -34,7 +34,7 @@ def train(config: TrainConfig, how: TrainOptions, where: RunLocation) -> int:
             check_writable(make_folder(VIDEOS))
         session = _session(begun, how)
         print(
-            f"{where.preset} on {config.backend}: {counted(config.episodes, 'episode')}, "
+            f"{where.preset} on {config.backend}: {counted(config.episodes, config.episode)}, "
             f"seed {config.seed}{about(where, folder, config)}",
             flush=True,
         )
@@ -87,7 +87,8 @@ def _finish(session: Session, begun: Begun, how: TrainOptions, signals: StopSign
             )
         _print_learning(result)
         if "stopped" in summary:
-            print(f"\nstopped after episode {summary['episodes']:,}: {summary['stopped']}")
+            after = f"{result.config.episode} {summary['episodes']:,}"
+            print(f"\nstopped after {after}: {summary['stopped']}")
         if signals.stop() or greedy is None:
             raise Interrupted(number=signals.number)
         print_evaluation(greedy)
@@ -102,7 +103,7 @@ def _finish(session: Session, begun: Begun, how: TrainOptions, signals: StopSign
 
 def _done(session: Session) -> str:
     training = session.training
-    return f"{len(training.log):,} of {counted(training.config.episodes, 'episode')}"
+    return f"{len(training.log):,} of {counted(training.config.episodes, training.config.episode)}"
 
 
 def _kept(folder: Path) -> str:
@@ -113,6 +114,12 @@ def _kept(folder: Path) -> str:
 
 def _print_learning(result: TrainResult) -> None:
     """Print the article's table, mean return of each `log_every` episodes, and greedy means."""
+    if result.seen is not None:
+        episodes, steps = result.seen
+        print(
+            f"\nfitted to {counted(steps, 'step')} in {counted(episodes, 'episode')} of the world; "
+            "the returns below are dreamt in that model, greedy ones are real"
+        )
     returns, every = result.returns, result.config.log_every
     # The last evaluation of each block stands beside it.
     greedy = {(point.episodes - 1) // every: point.mean for point in result.evaluations}

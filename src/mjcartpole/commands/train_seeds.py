@@ -64,7 +64,7 @@ def _runner(begun: ManyBegun, folder: Path, how: TrainOptions) -> SeedRunner:
 def _print_head(runner: SeedRunner, begun: ManyBegun, more: str) -> None:
     print(
         f"{begun.preset} on {begun.config.backend}: {counted(len(runner.seeds), 'seed')} from "
-        f"{runner.seeds[0]}, {counted(begun.config.episodes, 'episode')} each, "
+        f"{runner.seeds[0]}, {counted(begun.config.episodes, begun.config.episode)} each, "
         f"{runner.workers} at once{more}\n",
         flush=True,
     )
@@ -96,6 +96,6 @@ def _print_solving(many: ManyResult) -> None:
         return
     median, p95 = ("never" if n is None else f"{n:,}" for n in (its.median, its.p95))
     print(
-        f"episodes until the mean greedy return was at least {its.at:g}: median {median}, "
-        f"95 % of seeds {p95} ({its.solved} of {its.seeds} reached it)"
+        f"{many.config.episode}s until the mean greedy return was at least {its.at:g}: "
+        f"median {median}, 95 % of seeds {p95} ({its.solved} of {its.seeds} reached it)"
     )

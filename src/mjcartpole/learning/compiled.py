@@ -15,6 +15,7 @@ from mjcartpole.learning import kernels
 from mjcartpole.learning.compiling import compiling
 from mjcartpole.learning.discretizer import Discretizer, Grid
 from mjcartpole.learning.episodes import EpisodeLog
+from mjcartpole.learning.fitted import Fitted
 from mjcartpole.learning.learner import Learner
 from mjcartpole.learning.loop import in_episode
 from mjcartpole.learning.policy import Policy
@@ -58,6 +59,7 @@ class CompiledLoop:
         model: ModelLike,
         integrator: Integrator,
         task: Task = CARTPOLE_V1,
+        fitted: Fitted | None = None,
     ) -> None:
         """Load the model.
 
@@ -66,6 +68,7 @@ class CompiledLoop:
             model: See `load_model`; for backend mujoco.
             integrator: See `Simulation`; for backend mujoco.
             task: The rules.
+            fitted: Plays in this model of the world instead of in the world.
 
         Raises:
             ModelError: The model cannot be used.
@@ -74,7 +77,7 @@ class CompiledLoop:
             Simulation(load_model(model), integrator) if backend == "mujoco" else None
         )
         self._memory = _Memory.of(self._simulation, task)
-        self._physics = _physics(self._simulation, self._memory, task)
+        self._physics = _physics(self._simulation, self._memory, task, fitted)
         self._task, self._rules = task, _rules(task)
         size = self._simulation.size if self._simulation else len(state_names())
         self._chunk = _control_steps(self._simulation)
@@ -207,7 +210,11 @@ class _Memory(NamedTuple):
         return cls(joints, np.zeros(2 * joints.size), np.zeros(joints.size), start)
 
 
-def _physics(simulation: Simulation | None, memory: _Memory, task: Task) -> Physics:
+def _physics(
+    simulation: Simulation | None, memory: _Memory, task: Task, fitted: Fitted | None
+) -> Physics:
+    if fitted is not None:
+        return fitted._replace(start=float(task.start_angle))
     if simulation is None:
         return GymPhysics(-FORCE, FORCE, float(task.start_angle))
     cartpole, model, data = simulation.cartpole, simulation.model, simulation.data

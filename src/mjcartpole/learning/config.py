@@ -75,7 +75,7 @@ class TrainConfig:
     method: str = DEFAULT_METHOD
     """How the table learns; each method has parameters of its own."""
     episodes: int = 1_000
-    """Episodes to train."""
+    """Episodes to train; the method identify dreams them."""
     seed: int = 0
     """Seeds the environment and the learner."""
     bins: tuple[int, ...] = (1, 3, 6, 8)

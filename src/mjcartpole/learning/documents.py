@@ -31,6 +31,7 @@ _SUMMARY_FIELDS: Final[Fields] = {
     "interrupted": bool,
     "steps": int,
     "mean_return_last_100": float | None,
+    "seen?": {"episodes": int, "steps": int},
     "solved?": {"at": float, "episodes": int, "steps": int, "mean": float},
     "stopped?": str,
     "evaluation?": {

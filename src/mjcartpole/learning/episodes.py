@@ -82,11 +82,11 @@ class EpisodeLog(Sequence[Episode]):
         mean = f", mean return {self.columns.totals.mean():.2f}" if len(self) else ""
         return f"EpisodeLog({len(self):,} episodes{mean})"
 
-    def csv(self) -> str:
-        """One line per episode, numbered from 1, under a line of names."""
+    def csv(self, name: str = "episode") -> str:
+        """One line per episode, numbered from 1, under a line of names; the first is given."""
         # There are few different ones, so each is put together once.
         tails: dict[tuple[float, int, int], str] = {}
-        lines = ["episode,return,steps,ending\n"]
+        lines = [f"{name},return,steps,ending\n"]
         columns = (column.tolist() for column in self.columns)
         for number, episode in enumerate(zip(*columns, strict=True), start=1):
             if episode not in tails:

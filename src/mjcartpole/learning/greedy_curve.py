@@ -14,7 +14,7 @@ class GreedyPoint(NamedTuple):
     episodes: int
     """Training episodes before them."""
     steps: int
-    """Environment steps of those."""
+    """Their steps."""
     seconds: float
     """Time that those took."""
     mean: float

@@ -21,7 +21,7 @@ from numba import types
 from numba.extending import register_jitable
 
 from mjcartpole import task
-from mjcartpole.learning import discretizer, episodes, stepping, tiles
+from mjcartpole.learning import discretizer, episodes, fitted, stepping, tiles
 from mjcartpole.learning.discretizer import Grid
 from mjcartpole.learning.episodes import Columns
 from mjcartpole.learning.methods import experience
@@ -324,6 +324,7 @@ _SHARED: Final = (
     cartpole_v1,
     discretizer,
     episodes,
+    fitted,
     stepping,
     task,
     tiles,

@@ -2,11 +2,13 @@
 
 from typing import Any, Final
 
+import gymnasium
 import numpy as np
 import numpy.typing as npt
 
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.discretizer import Discretizer
+from mjcartpole.learning.fitted import Fitted
 from mjcartpole.learning.methods import method_named
 from mjcartpole.learning.methods.experience import Dynamics
 from mjcartpole.learning.methods.limits import check_limits
@@ -61,6 +63,24 @@ class Learner:
     def plan(self, dynamics: Dynamics) -> None:
         """Learn from equations."""
         self.method.plan(self.p, self.memory, self._discretizer, dynamics)
+
+    @property
+    def dreams(self) -> bool:
+        """Whether the method's episodes are played in a model that it fits to the world."""
+        return hasattr(self.method, "imagine")
+
+    @property
+    def seen(self) -> tuple[int, int] | None:
+        """How many episodes and steps of the world a model was fitted to; None without one."""
+        if not self.dreams:
+            return None
+        episodes, steps = self.memory.seen.tolist()
+        return episodes, steps
+
+    def imagine(self, env: gymnasium.Env[Any, Any], h: float) -> Fitted:
+        """Return the model of a world with a control step of h seconds, fitted if it was not."""
+        fitted: Fitted = self.method.imagine(self.p, self.memory, env, h, self.rng)
+        return fitted
 
     @property
     def greedy_values(self) -> npt.NDArray[np.float64]:

@@ -167,7 +167,7 @@ def write_results(folder: Path, result: TrainResult, summary: dict[str, Any]) ->
     Raises:
         FileError: The folder cannot be written.
     """
-    write_whole(folder / EPISODES, result.episodes.csv())
+    write_whole(folder / EPISODES, result.episodes.csv(result.config.episode.replace(" ", "_")))
     result.policy.save(folder / POLICY)
     timing = {"training_seconds": round(result.seconds, 3), "steps": result.steps}
     if result.solved is not None:

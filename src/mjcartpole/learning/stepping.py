@@ -1,7 +1,8 @@
 """One control step, its start and its end as compiled code: MuJoCo's own C step, or CartPole-v1's.
 
-There are two kinds of physics, and a function of each for everything that differs; Numba takes
-the one that fits. A state is a tuple of four floats, which costs no memory and no look-up; those of
+There are kinds of physics, and a function of each for everything that differs; Numba takes the one
+that fits. A model that was fitted to the world is one as well, and differs from gymnasium's in its
+step only. A state is a tuple of four floats, which costs no memory and no look-up; those of
 several poles are read from MuJoCo's own arrays where all of them count.
 
 `mj_step` and `mj_resetData` are called in libmujoco by address-free linking, the one form that
@@ -17,9 +18,10 @@ import numba
 import numpy as np
 import numpy.typing as npt
 from numba import types
-from numba.extending import intrinsic, overload
+from numba.extending import intrinsic, overload, register_jitable
 
 from mjcartpole import task
+from mjcartpole.learning import fitted
 from mjcartpole.physics import cartpole_v1
 from mjcartpole.physics.simulation import FARTHEST_SANE, LARGEST_SANE
 
@@ -86,7 +88,7 @@ class GymPhysics(NamedTuple):
     """Angle at the start, rad; what is drawn is added."""
 
 
-Physics: TypeAlias = MujocoPhysics | GymPhysics
+Physics: TypeAlias = MujocoPhysics | GymPhysics | fitted.Fitted
 AnyPhysics: TypeAlias = Any
 """One of them, where Numba is to see one name for all."""
 
@@ -136,13 +138,20 @@ _mj_step = types.ExternalFunction("mj_step", types.void(types.intp, types.intp))
 _mj_reset = types.ExternalFunction("mj_resetData", types.void(types.intp, types.intp))
 
 
-def _for_each(mujoco: F, gym: F) -> Callable[[F], F]:
-    """Let Numba take one function or the other for a stub, by the physics: its first argument."""
+def _for_each(mujoco: F, gym: F, **others: Callable[..., State]) -> Callable[[F], F]:
+    """Let Numba take one function of these for a stub, by the physics: its first argument.
+
+    Args:
+        mujoco: That for `MujocoPhysics`.
+        gym: That for all kinds without one of their own.
+        others: Those, by the names of the kinds.
+    """
+    functions: dict[str, Any] = {"MujocoPhysics": mujoco, **others}
 
     def register(stub: F) -> F:
         @overload(stub, strict=False)
-        def choose(physics: AnyPhysics, *others: object) -> F:
-            return mujoco if physics.instance_class is MujocoPhysics else gym
+        def choose(physics: AnyPhysics, *others: object) -> Any:
+            return functions.get(physics.instance_class.__name__, gym)
 
         return stub
 
@@ -201,7 +210,20 @@ def _advance_gym(physics: AnyPhysics, rules: Rules, state: State, action: int) -
     return _cartpole_v1_step(state[0], state[1], state[2], state[3], force)
 
 
-@_for_each(_advance_mujoco, _advance_gym)
+register_jitable(fitted.bounded)
+register_jitable(fitted.dot)
+_rod_step, _linear_step = compiled(fitted.rod_step), compiled(fitted.linear_step)
+
+
+def _advance_rod(physics: AnyPhysics, rules: Rules, state: State, action: int) -> State:
+    return _rod_step(physics, state, action)
+
+
+def _advance_linear(physics: AnyPhysics, rules: Rules, state: State, action: int) -> State:
+    return _linear_step(physics, state, action)
+
+
+@_for_each(_advance_mujoco, _advance_gym, Rod=_advance_rod, Linear=_advance_linear)
 def advance(physics: AnyPhysics, rules: Rules, state: State, action: int) -> State:
     """Return the state one control step later."""
     raise NotImplementedError

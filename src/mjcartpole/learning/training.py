@@ -15,6 +15,7 @@ from mjcartpole.envs.backend import make_env
 from mjcartpole.errors import ConfigError, SimulationError
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.discretizer import Discretizer
+from mjcartpole.learning.dream import Dream
 from mjcartpole.learning.dynamics import dynamics_of
 from mjcartpole.learning.engine import Engine, check_engine, choose_engine
 from mjcartpole.learning.episodes import Columns, EpisodeLog
@@ -25,6 +26,7 @@ from mjcartpole.learning.loop import learn_episodes
 from mjcartpole.learning.policy import Policy
 from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.symmetry import check_symmetric
+from mjcartpole.task import CONTROL_STEP
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -37,6 +39,8 @@ class TrainResult:
         episodes: One record per episode that was finished.
         seconds: Time it took, without that for compiling the loop and for greedy episodes.
         evaluations: The greedy evaluations in its midst, where the config asks for them.
+        seen: How many episodes and steps of the world a model was fitted to, in which all episodes
+            above were played; None where they were played in the world itself.
     """
 
     config: TrainConfig
@@ -44,6 +48,7 @@ class TrainResult:
     episodes: EpisodeLog
     seconds: float
     evaluations: tuple[GreedyPoint, ...] = ()
+    seen: tuple[int, int] | None = None
 
     @property
     def q_table(self) -> npt.NDArray[np.float64]:
@@ -57,7 +62,7 @@ class TrainResult:
 
     @property
     def steps(self) -> int:
-        """Environment steps of all episodes."""
+        """Steps of all episodes."""
         return int(self.episodes.columns.steps.sum())
 
     @property
@@ -150,14 +155,15 @@ class Training:
         if env is not None:
             self._env = env
             return
-        physics = (config.backend, cartpole or config.model, config.integrator, config.rules)
+        model = cartpole or config.model
+        self._physics = (config.backend, model, config.integrator, config.rules)
         self.engine = choose_engine(engine, config.backend, cartpole, config.rules)
         if self.engine == "compiled":
             from mjcartpole.learning.compiled import CompiledLoop  # noqa: PLC0415 - it is heavy
 
-            self._loop = CompiledLoop(*physics)
+            self._loop = CompiledLoop(*self._physics)
         else:
-            self._env = make_env(*physics)
+            self._env = make_env(*self._physics)
 
     def run(self) -> Iterator[int]:
         """Train to the end; the clock runs neither while the loop is compiled nor in evaluations.
@@ -169,6 +175,7 @@ class Training:
             SimulationError: The physics diverged; names episode and step.
         """
         run = self._run_compiled if self.engine == "compiled" else self._run_python
+        self._imagine()
         if self.engine == "compiled":
             self._loop.compile(self.learner, self.discretizer, self._env_rng, self.log)
         self._plan()
@@ -182,6 +189,22 @@ class Training:
                 yield finished
         if self.engine == "python":
             self._env.close()
+
+    def _imagine(self) -> None:
+        """Let a method that does so fit a model to the world; its episodes are played in there."""
+        if not self.learner.dreams:
+            return
+        started = time.perf_counter()
+        world = self._env if self.engine == "python" else make_env(*self._physics)
+        world.unwrapped.np_random = self._env_rng
+        cartpole, rules = self._cartpole, self.config.rules
+        fitted = self.learner.imagine(world, cartpole.control_step if cartpole else CONTROL_STEP)
+        world.close()
+        if self.engine == "compiled":
+            self._loop = type(self._loop)(*self._physics, fitted)
+        else:
+            self._env = Dream(fitted, rules)
+        self._seconds += time.perf_counter() - started
 
     def _plan(self) -> None:
         """Let a method that does so learn from the equations, before the first episode."""
@@ -238,6 +261,7 @@ class Training:
             episodes=self.log.copy(),
             seconds=self._seconds,
             evaluations=self.evaluations,
+            seen=self.learner.seen,
         )
 
     def _policy(self) -> Policy:
@@ -303,7 +327,9 @@ def training_grid(
         ConfigError: It is for another number of poles, or what is to be mirrored is not symmetric.
     """
     cartpole = None if config.backend == "gym" else cartpole
-    grid = config.discretizer(_count_poles(cartpole, env))
+    poles = _count_poles(cartpole, env)
+    config.check_world(poles, config.rules)
+    grid = config.discretizer(poles)
     if config.mirror is False or (config.mirror is None and env is not None):
         return grid
     try:

@@ -67,6 +67,8 @@ def _summary(result: TrainResult, *, preset: str, interrupted: bool) -> dict[str
         "steps": result.steps,
         "mean_return_last_100": float(returns[-100:].mean()) if len(returns) else None,
     }
+    if result.seen is not None:
+        summary["seen"] = dict(zip(("episodes", "steps"), result.seen, strict=True))
     if solved is not None:
         episodes, steps, _, mean, _ = solved
         summary["solved"] = {

@@ -8,15 +8,18 @@ functions of this package, and the draws of a `numpy.random.Generator`. `Method`
 from collections.abc import Callable
 from typing import Any, Final, Protocol
 
+import gymnasium
 import numpy as np
 import numpy.typing as npt
 
 from mjcartpole.errors import check_known
 from mjcartpole.learning.discretizer import Discretizer
+from mjcartpole.learning.fitted import Fitted
 from mjcartpole.learning.methods import (
     actor_critic,
     double_q,
     expected_sarsa,
+    identify,
     model,
     n_step_sarsa,
     planning,
@@ -53,6 +56,11 @@ class Method(Protocol):
     """What a method has whose memory could contradict itself: raises ValueError, and names the
     field. What each field may hold stands in its type (see `limits`). Others need not have it."""
 
+    imagine: Callable[[Any, Any, gymnasium.Env[Any, Any], float, np.random.Generator], Fitted]
+    """What a method has whose episodes are played in a model of the world: from p, memory, the
+    world, the seconds of its control step and the learner's generator to that model, which memory
+    keeps. Others need not have it."""
+
     def begin_episode(self, p: Any, memory: Any, number: int, episodes: int) -> Any:
         """Return a NamedTuple of what holds during one of so many episodes, counted from 0."""
 
@@ -85,6 +93,7 @@ METHODS: Final[dict[str, Any]] = {
     "reinforce": reinforce,
     "actor-critic": actor_critic,
     "planning": planning,
+    "identify": identify,
 }
 """Every method by its name; each value is a `Method`."""
 

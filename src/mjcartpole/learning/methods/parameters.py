@@ -7,17 +7,27 @@ from typing import Any, ClassVar, Literal, get_args, get_origin
 
 from mjcartpole.errors import ConfigError
 from mjcartpole.learning.discretizer import is_finite
+from mjcartpole.task import Task
 
 
 @dataclass(frozen=True, kw_only=True)
 class Parameters:
     """What a method can be told; the base of each method's own."""
 
+    episode: ClassVar[str] = "episode"
+    """What one of its episodes is called."""
     interpolated: ClassVar[bool] = False
     """Whether its table has nodes instead of bins, and values in between."""
 
     def check_parameters(self) -> None:
         """Refuse values that make no sense.
+
+        Raises:
+            ConfigError: See above.
+        """
+
+    def check_world(self, poles: int, task: Task) -> None:
+        """Refuse a number of poles, or rules, that the method is not for.
 
         Raises:
             ConfigError: See above.
