@@ -1,7 +1,7 @@
 // Opens a page in a real browser, from disk and without a network, and does what stdin says in JSON:
-// {file, browser, width, height, dark, still, without: ["WebGL2RenderingContext", …], acts: [{evaluate: "…"},
+// {file, browser, width, height, dark, still, without: ["WebGL2RenderingContext", …], acts: [{evaluate: "…"}, {do: "…"},
 //  {press: "Space"}, {hold: "ArrowLeft", ms: 200}, {drag: [[x, y], [x, y]]}, {click: "css"}, {at: [x, y]},
-//  {fill: ["css", "text"]}, {wait: ms}, {shot: "file.png", whole: true}]}
+//  {fill: ["css", "text"]}, {wait: ms}, {until: "…"}, {shot: "file.png", whole: true}]}
 // What each `evaluate` gives, what the console said and how long it took to begin come back as JSON.
 import { chromium, firefox } from "playwright-core";
 
@@ -10,6 +10,7 @@ const HELD_MS = 400;
 
 const acts = {
   evaluate: (page, { evaluate }) => page.evaluate(evaluate),
+  do: (page, { do: script }) => page.evaluate(script),
   press: (page, { press }) => page.keyboard.press(press),
   hold: async (page, { hold, ms }) => {
     await page.keyboard.down(hold);
@@ -26,6 +27,7 @@ const acts = {
   click: (page, { click }) => page.click(click),
   at: (page, { at }) => page.mouse.click(...at),
   fill: (page, { fill }) => page.fill(...fill),
+  until: (page, { until }) => page.waitForFunction(until),
   wait: (page, { wait }) => page.waitForTimeout(wait),
   shot: (page, { shot, whole }) => page.screenshot({ path: shot, fullPage: whole === true }),
 };

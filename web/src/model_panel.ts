@@ -68,7 +68,7 @@ export class ModelPanel {
     input.setAttribute("aria-valuetext", output.textContent);
   }
 
-  /** Edit by meaning; compiled with the next picture. */
+  /** Edit by meaning; compiled as soon as the browser is free. */
   set(key: string, value: number): void {
     const slider = this.sliders.find((each) => each.key === key);
     if (!slider) throw new Unfit(`The model has no ${key} to edit.`);
@@ -78,7 +78,7 @@ export class ModelPanel {
     this.say(slider, value);
     if (this.isDue) return;
     this.isDue = true;
-    requestAnimationFrame(() => {
+    setTimeout(() => {
       this.isDue = false;
       this.take(() => edited(this.loader, this.base, this.edits));
     });
