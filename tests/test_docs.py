@@ -27,6 +27,7 @@ from PIL import Image
 import mjcartpole
 from mjcartpole import cli
 from mjcartpole.media.gl import can_use
+from mjcartpole.page.document import ASSETS
 from nightly import few
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -51,6 +52,7 @@ FAST = {
 """What short reads run: commands, and Python blocks by their first line."""
 
 NOT_HERE = {
+    "make page": "it loads packages from an index",
     "make test": "it is the suite that this test belongs to",
     '.venv/bin/python -m pytest -q -m "not slow"': "it is the suite that this test belongs to",
     "python3 -m venv .venv": "the test brings an environment that is set up",
@@ -111,7 +113,7 @@ PICTURES = {
 PLAIN = {
     "models/                 MJCF files, hand-written and commented; they ship inside the wheel",
     "errors ← cores ← task ← integrator ← leftovers ← files ← versions ← physics ← media ← envs"
-    " ← learning ← studies ← commands ← cli",
+    " ← learning ← studies ← page ← commands ← cli",
     "Q(s, a) ← Q(s, a) + α (G − Q(s, a))",  # noqa: RUF001 - a formula
     "G_t = r_t + γ ((1 − λ) max Q(s_t+1, ·) + λ G_t+1)",  # noqa: RUF001 - a formula
 }
@@ -255,7 +257,11 @@ class Reader:
 def lacking() -> set[str]:
     """Blocks that need what not every machine has."""
     everything = [block for page in PAGES for block in blocks(page)]
-    needs = {"path/to/dm_control": bool(find_spec("dm_control")), '"egl"': can_use("egl")}
+    needs = {
+        "path/to/dm_control": bool(find_spec("dm_control")),
+        '"egl"': can_use("egl"),
+        "mjcartpole page": (ASSETS / "page.js").is_file(),
+    }
     return {
         block.name
         for block in everything
@@ -282,7 +288,15 @@ def checkout(tmp_path_factory):
     folder = tmp_path_factory.mktemp("checkout") / "mjcartpole"
     source = Path(mjcartpole.__file__).parents[1]
     ignored = shutil.ignore_patterns(
-        ".git", ".venv", ".*_cache", ".hypothesis", "__pycache__", "runs", "transfer", "src"
+        ".git",
+        ".venv",
+        ".*_cache",
+        ".hypothesis",
+        "__pycache__",
+        "runs",
+        "transfer",
+        "src",
+        "node_modules",
     )
     shutil.copytree(ROOT, folder, ignore=ignored)
     # The loop is compiled once for all pages.

@@ -20,7 +20,8 @@ declare global {
 }
 
 const OTHER = "another pole than the one that was recorded: parity does not apply";
-const GYM = "Trained on gymnasium's own CartPole-v1, and played here on the reference MJCF under explicit Euler, which is the same motion but for rounding.";
+const HERE = "MuJoCo itself moves it, here in your browser: drag it, push it, change it, or balance it yourself.";
+const GYM = `It was trained on gymnasium's own CartPole-v1, and is played here on the reference model under explicit Euler: the same motion but for rounding. ${HERE}`;
 
 export class App {
   readonly element: HTMLElement;
@@ -34,7 +35,7 @@ export class App {
   private readonly badge = make("p", { class: "parity", role: "status" });
   private readonly top = make("div", { class: "top" });
   private readonly below = make("div", { class: "below" });
-  private readonly about = make("p", { class: "note", hidden: true });
+  private readonly lead = make("p", { class: "lead" });
   private readonly switches: HTMLSelectElement | null;
 
   constructor(
@@ -44,7 +45,7 @@ export class App {
     const runs = data.runs.map((run, i): [string, string] => [String(i), run.name]);
     const name = runs.length > 1 ? choice("Run", runs, (value) => void this.show(Number(value))) : make("p", {}, data.runs[0].name);
     this.switches = name.querySelector("select");
-    this.element = make("main", {}, make("header", {}, make("h1", {}, "mjcartpole"), name, this.badge), this.about);
+    this.element = make("main", {}, make("header", {}, make("h1", {}, "mjcartpole"), name, this.badge), this.lead);
     if (typeof engine === "string") this.element.append(make("p", { class: "alert", role: "alert" }, engine));
     else {
       this.mujoco = engine;
@@ -62,9 +63,9 @@ export class App {
     this.isReady = false;
     this.run = this.data.runs[index];
     if (this.switches) this.switches.value = String(index);
-    this.policy = new Policy(this.run.grid, await numbersOf(this.run.table));
-    this.about.textContent = GYM;
-    this.about.hidden = this.run.backend !== "gym";
+    const table = await numbersOf(this.run.table);
+    this.policy = new Policy(this.run.grid, table);
+    this.lead.textContent = `A table of ${table.length.toLocaleString("en")} numbers keeps this pole up. ${this.run.backend === "gym" ? GYM : HERE}`;
     const panel = new TablePanel(this.policy, this.run.parts.hinges.length);
     this.top.querySelector(".table")?.remove();
     this.top.append(panel.element);

@@ -1,6 +1,7 @@
 """`mjcartpole page`."""
 
 import dataclasses
+import sys
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -40,20 +41,21 @@ class Page(Command):
     def run(self) -> int:
         """Play an episode of each, and write the page; all is checked before anything is played."""
         from mjcartpole.commands.policies import set_up, shown
-        from mjcartpole.media.plots import check_installed
+        from mjcartpole.media.plots import is_installed
         from mjcartpole.page.document import check_built, page_html
 
         if not self.sources:
             raise UsageError("page needs a RUN-OR-POLICY, or several; see mjcartpole page --help")
         check_built()
-        if self.plots:
-            check_installed()
+        plots = self.plots and is_installed()
+        if self.plots and not plots:
+            print("mjcartpole: no plots: matplotlib is not installed ([plot])", file=sys.stderr)
         sources = [shown(source) for source in self.sources]
         setups = [set_up(source, self.target) for source in sources]
         path = self.output or Path(f"{setups[0].name}.html")
         self._check(path)
         pairs = zip(sources, setups, strict=True)
-        runs = [_data(source, setup, self.plots) for source, setup in pairs]
+        runs = [_data(source, setup, plots) for source, setup in pairs]
         text = page_html(runs)
         if len(text) > _MOST and any(run["film"] for run in runs):
             print("page: the films are left out, with which it would be larger than 6 MB")
