@@ -24,6 +24,9 @@ MOST_STEPS: Final = 10_000_000
 
 _TURN: Final = 2 * math.pi
 
+Number = TypeVar("Number", float, npt.NDArray[np.float64])
+"""One, or many."""
+
 Reward: TypeAlias = Callable[[float, float, float, float, bool], float]
 """From the state after a step (x, x_dot, theta, theta_dot; m, m/s, rad, rad/s) and whether it ends
 the episode by the rules. Of several poles, theta and theta_dot are those of largest size. A plain
@@ -67,11 +70,12 @@ class Task:
             counts from -pi to pi: in observations, for the reward and for the rules.
         start_low: Lower bound of each of the starting state's values, drawn uniformly.
         start_high: Upper bound.
-        start_angle: Where poles start, in radians: 0 upright, pi hanging; what is drawn is added. A
-            pole on another starts in line with it.
         reward: Reward of one control step.
         time_limit: Control steps until an episode is truncated.
         reward_threshold: Mean return at which it counts as solved; None where nothing is agreed.
+        start_angle: Where poles start, in radians: 0 upright, pi hanging; what is drawn is added. A
+            pole on another starts in line with it.
+        continuous: Whether an action is any push from -1, action 0's, to 1, action 1's.
     """
 
     name: str
@@ -79,10 +83,11 @@ class Task:
     theta_limit: float = 12 * 2 * math.pi / 360
     start_low: float = -0.05
     start_high: float = 0.05
-    start_angle: float = 0.0
     reward: Reward = one_per_step
     time_limit: int = 500
     reward_threshold: float | None = None
+    start_angle: float = 0.0
+    continuous: bool = False
 
     def __post_init__(self) -> None:
         """Refuse rules that make no sense.
@@ -118,6 +123,17 @@ class Task:
     def turns(self) -> bool:
         """Whether a pole may turn right round."""
         return math.isinf(self.theta_limit)
+
+    def seen(self, states: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        """Return states as rules and observations have them, shape (..., 2 + 2 poles).
+
+        Where poles may turn, their angles count from -pi to pi, in a copy.
+        """
+        if not self.turns:
+            return states
+        turned = states.copy()
+        turned[..., 2::2] = wrapped(turned[..., 2::2])
+        return turned
 
     @property
     def most_return(self) -> float:
@@ -187,8 +203,11 @@ def register(task: Task) -> Task:
 SWING_UP: Final = Task("SwingUp-v0", theta_limit=math.inf, start_angle=math.pi, reward=upright)
 """A pole that hangs is to be swung up, and kept there."""
 
-register(CARTPOLE_V1)
-register(SWING_UP)
+CONTINUOUS: Final = dataclasses.replace(CARTPOLE_V1, name="Continuous-v0", continuous=True)
+"""CartPole-v1 with any force between those of its two actions."""
+
+for _each in (CARTPOLE_V1, SWING_UP, CONTINUOUS):
+    register(_each)
 
 
 def task_named(name: str) -> Task:
@@ -208,6 +227,16 @@ def resolve(task: Task | str) -> Task:
         ConfigError: There is none of that name.
     """
     return task if isinstance(task, Task) else task_named(task)
+
+
+def control_of(push: Number, controls: tuple[float, float]) -> Number:
+    """Return the control of a push from -1 to 1, between those of the two actions.
+
+    >>> control_of(0.0, (-1.0, 1.0))
+    0.0
+    """
+    left, right = controls
+    return ((1.0 - push) * left + (1.0 + push) * right) / 2.0
 
 
 N_ACTIONS: Final = 2
@@ -245,19 +274,9 @@ def max_abs(values: Sequence[float] | npt.NDArray[np.float64]) -> float:
     return largest + 0.0 * total
 
 
-Angles = TypeVar("Angles", float, npt.NDArray[np.float64])
-
-
-def wrapped(theta: Angles) -> Angles:
+def wrapped(theta: Number) -> Number:
     """Return an angle as it counts from -pi to pi; Numba compiles this as it is."""
     return theta - _TURN * ((theta + math.pi) // _TURN)
-
-
-def wrap_angles(states: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    """Return states whose angles count from -pi to pi, shape (..., 2 + 2 poles), a copy."""
-    turned = states.copy()
-    turned[..., 2::2] = wrapped(turned[..., 2::2])
-    return turned
 
 
 def worst_pole(state: Sequence[float]) -> tuple[float, float, float, float]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from mjcartpole.commands.options import Command, Included
+from mjcartpole.commands.options import Command, Included, UsageError
 from mjcartpole.commands.printing import counted, print_evaluation, print_seeds
 from mjcartpole.learning.evaluation import EPISODES, Evaluation, evaluate
 from mjcartpole.studies.eval_target import EvalTarget
@@ -21,8 +21,12 @@ if TYPE_CHECKING:
 class Evaluate(Command):
     """Play greedy episodes from fresh starting states, and count."""
 
-    source: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="RUN-OR-POLICY")]
+    source: Annotated[Path | None, tyro.conf.Positional, tyro.conf.arg(metavar="RUN-OR-POLICY")] = (
+        None
+    )
     """A run folder, one of many --seeds, or a policy file."""
+    policy: str | None = None
+    """A controller instead, made for the model that it plays: lqr, energy, random, constant."""
     target: Included[EvalTarget] = field(default_factory=EvalTarget)
     episodes: int = EPISODES
     """How many."""
@@ -31,12 +35,20 @@ class Evaluate(Command):
 
     def run(self) -> int:
         """Play, and print the figures; of many seeds, of each."""
-        from mjcartpole.commands.policies import set_up
+        from mjcartpole.commands.policies import set_up, set_up_controller
         from mjcartpole.studies.multi_seed_runs import is_seeds
 
-        if is_seeds(self.source):
-            return self._run_seeds()
-        setup = set_up(self.source, self.target)
+        if self.source and not self.policy:
+            if is_seeds(self.source):
+                return self._run_seeds(self.source)
+            setup = set_up(self.source, self.target)
+        elif self.policy and not self.source:
+            setup = set_up_controller(self.policy, self.target)
+        else:
+            raise UsageError(
+                "evaluate needs a RUN-OR-POLICY, or --policy and the name of a controller; "
+                "see mjcartpole evaluate --help"
+            )
         result = self._evaluate(setup)
         if self.json:
             print(json.dumps({**self._head(setup), **result.summary()}))
@@ -44,12 +56,12 @@ class Evaluate(Command):
             print_evaluation(result, self._chosen_model(setup))
         return 0
 
-    def _run_seeds(self) -> int:
+    def _run_seeds(self, source: Path) -> int:
         from mjcartpole.commands.policies import learned_seeds, set_up
         from mjcartpole.learning.documents import read_config
         from mjcartpole.studies.seeds import ManyResult, SeedResult
 
-        learned = learned_seeds(self.source)
+        learned = learned_seeds(source)
         setups = {seed: set_up(run, self.target) for seed, run in learned.items()}
         found = [SeedResult(seed, self._evaluate(setup)) for seed, setup in setups.items()]
         config = read_config(next(iter(learned.values())))[2]
@@ -86,7 +98,7 @@ class Evaluate(Command):
         )
 
     def _head(self, setup: "PolicySetup") -> dict[str, str]:
-        return {"policy": str(self.source), "model": _model_name(setup)}
+        return {"policy": str(self.source or self.policy), "model": _model_name(setup)}
 
     def _chosen_model(self, setup: "PolicySetup") -> str:
         """Return what a headline says of a model that is not the policy's own."""

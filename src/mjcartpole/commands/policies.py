@@ -10,7 +10,7 @@ from mjcartpole.learning.documents import read_summary
 from mjcartpole.physics.simulation import silence_mujoco
 from mjcartpole.studies import multi_seed_runs
 from mjcartpole.studies.eval_target import EvalTarget
-from mjcartpole.studies.policy_setup import PolicySetup, find_setup
+from mjcartpole.studies.policy_setup import PolicySetup, controller_setup, find_setup
 
 
 def set_up(source: Path, target: EvalTarget) -> PolicySetup:
@@ -21,6 +21,16 @@ def set_up(source: Path, target: EvalTarget) -> PolicySetup:
     """
     silence_mujoco()
     return find_setup(source, target)
+
+
+def set_up_controller(name: str, target: EvalTarget) -> PolicySetup:
+    """Make a controller for where it is played; see `controller_setup`, and `set_up`.
+
+    Raises:
+        MjCartPoleError: Something cannot be used.
+    """
+    silence_mujoco()
+    return controller_setup(name, target)
 
 
 def learned_seeds(folder: Path) -> dict[int, Path]:

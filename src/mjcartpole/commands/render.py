@@ -29,6 +29,8 @@ class Render(Command):
     sources: Policies = ()
     """Run folders or policy files; several are shown side by side, from the same start. Of many
     --seeds in one folder, the median seed is shown."""
+    policy: tuple[str, ...] = ()
+    """Controllers, made for the model that they play: lqr, energy, random, constant."""
     target: Included[EvalTarget] = field(default_factory=EvalTarget)
     output: OutputPath = None
     """An .mp4, .gif or .webp, or a folder for pictures; videos/<name>.mp4 if left out, with a
@@ -44,16 +46,18 @@ class Render(Command):
     def run(self) -> int:
         """Play, and film it; all is checked before anything is played."""
         from mjcartpole.commands.films import default_path, film, write_sheet
-        from mjcartpole.commands.policies import set_up, shown
+        from mjcartpole.commands.policies import set_up, set_up_controller, shown
         from mjcartpole.studies.film import play
 
-        if not self.sources:
+        if not (self.sources or self.policy):
             raise UsageError(
-                "render needs a RUN-OR-POLICY, or several; see mjcartpole render --help"
+                "render needs a RUN-OR-POLICY, or several, or --policy; "
+                "see mjcartpole render --help"
             )
         signals = StopSignals()
         with signals.caught():
             setups = [set_up(shown(source), self.target) for source in self.sources]
+            setups += [set_up_controller(name, self.target) for name in self.policy]
             suffix = ".png" if self.sheet else ".mp4"
             path = self.output or default_path(setups, suffix, self.overwrite)
             self._check(setups, path)
@@ -70,7 +74,7 @@ class Render(Command):
             self.look.check(setup.cartpole)
             check_count(self.episodes, setup.seed)
         if self.sheet:
-            self._check_sheet(path)
+            self._check_sheet(len(setups), path)
         suffix = ".png" if self.sheet else check_path(path)
         if suffix and path.is_dir():
             raise FileError(f"cannot write '{path}': it is a folder; give the path of a file")
@@ -78,8 +82,8 @@ class Render(Command):
             check_free([path, *instead_of(path, suffix)])
         check_writable(path.parent)
 
-    def _check_sheet(self, path: Path) -> None:
-        for count, what in ((len(self.sources), "run"), (self.episodes, "episode")):
+    def _check_sheet(self, policies: int, path: Path) -> None:
+        for count, what in ((policies, "run"), (self.episodes, "episode")):
             if count > 1:
                 raise RenderError(
                     f"a contact sheet shows one {what}, not {count}; leave out --sheet"

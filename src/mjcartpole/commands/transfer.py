@@ -11,15 +11,14 @@ from typing import TYPE_CHECKING, Any
 from mjcartpole.commands.options import Command, OutputPath, Policies
 from mjcartpole.errors import ConfigError
 from mjcartpole.integrator import Integrator
-from mjcartpole.learning.evaluation import EPISODES, SEED
-from mjcartpole.learning.policy import Policy
+from mjcartpole.learning.evaluation import EPISODES, SEED, Player
 from mjcartpole.studies.eval_target import EvalTarget
 
 if TYPE_CHECKING:
     from mjcartpole.studies.policy_setup import PolicySetup
     from mjcartpole.task import Task
 
-PolicyGroups = Mapping[str, Sequence[Policy]]
+PolicyGroups = Mapping[str, Sequence[Player]]
 
 
 @dataclass(frozen=True)
@@ -28,6 +27,8 @@ class Transfer(Command):
 
     sources: Policies = ()
     """Run folders or policy files; many --seeds in one folder count as one."""
+    policy: tuple[str, ...] = ()
+    """Controllers, made for the reference model: lqr, energy, random, constant."""
     models: tuple[str, ...] = ()
     """Names or files of models, and gym for gymnasium's own; all there are if left out."""
     set: tuple[str, ...] = ()
@@ -93,10 +94,12 @@ class Transfer(Command):
             raise ConfigError(
                 f"a sweep edits one model, not {len(self.models)}; give one, or no --sweep"
             )
-        model = self.models[0] if self.models else self._set_up(self.sources[0]).model
+        known = *self.models, *(self._set_up(source).model for source in self.sources), "cartpole"
         name = "sweep-" + re.sub(r"[^\w.-]+", "-", key)
         target = tables.free_table(self.output, name, self.overwrite)
-        curve = sweep(policies, model, key, values, edits=self.set, **self._physics, **self._play)
+        curve = sweep(
+            policies, known[0], key, values, edits=self.set, **self._physics, **self._play
+        )
         tables.print_sweep(curve)
         _say_seeds(policies)
         summary = curve.summary()
@@ -114,7 +117,11 @@ class Transfer(Command):
 
     def _task(self) -> "Task":
         """Return by whose rules is played: those asked for, or all that the policies know."""
-        known = dict.fromkeys(self._set_up(source).task for source in self.sources)
+        from mjcartpole.studies.policy_setup import controller_setup
+
+        trained = [self._set_up(source).task for source in self.sources]
+        asked = [controller_setup(name, self._rules).task for name in self.policy]
+        known = dict.fromkeys(trained or asked)
         if len(known) > 1:
             names = " and ".join(f"{task.name} ({task.time_limit:,} steps)" for task in known)
             raise ConfigError(
@@ -130,21 +137,27 @@ class Transfer(Command):
 
         if is_seeds(source):
             source = next(iter(learned_seeds(source)[0].values()))
-        rules = EvalTarget(task=self.task, max_episode_steps=self.max_episode_steps)
-        return set_up(source, dataclasses.replace(rules, allow_assets=self.allow_assets))
+        return set_up(source, dataclasses.replace(self._rules, allow_assets=self.allow_assets))
+
+    @property
+    def _rules(self) -> EvalTarget:
+        return EvalTarget(task=self.task, max_episode_steps=self.max_episode_steps)
 
     def _find_policies(self) -> PolicyGroups:
         """Return policies by name, of many seeds all under one; those of one name by paths."""
-        if not self.sources:
-            raise ConfigError("transfer needs a RUN-OR-POLICY, or several")
+        from mjcartpole.studies.policy_setup import controller_setup
+
+        if not (self.sources or self.policy):
+            raise ConfigError("transfer needs a RUN-OR-POLICY, or several, or --policy")
+        controllers = {name: (controller_setup(name).policy,) for name in self.policy}
         found = {source: self._members(source) for source in self.sources}
         count = Counter(name for name, _ in found.values())
-        return {
+        return controllers | {
             name if count[name] == 1 else str(source): policies
             for source, (name, policies) in found.items()
         }
 
-    def _members(self, source: Path) -> tuple[str, tuple[Policy, ...]]:
+    def _members(self, source: Path) -> tuple[str, tuple[Player, ...]]:
         from mjcartpole.commands.policies import learned_seeds
         from mjcartpole.learning.runs import load_run
         from mjcartpole.studies.multi_seed_runs import is_seeds
@@ -153,7 +166,7 @@ class Transfer(Command):
             learned = learned_seeds(source).values()
             return source.resolve().name, tuple(load_run(run).policy for run in learned)
         setup = self._set_up(source)
-        return setup.name, (setup.policy,)
+        return setup.name, (setup.table,)
 
 
 def _fitting(policies: PolicyGroups) -> list[str]:
@@ -162,7 +175,7 @@ def _fitting(policies: PolicyGroups) -> list[str]:
     from mjcartpole.studies.transfer import GYM, find_place
 
     poles = {policy.poles for group in policies.values() for policy in group}
-    return [name for name in (GYM, *model_names()) if find_place(name).poles in poles]
+    return [name for name in (GYM, *model_names()) if poles & {find_place(name).poles, None}]
 
 
 def _say_seeds(policies: PolicyGroups) -> None:

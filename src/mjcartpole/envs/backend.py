@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 import gymnasium
 
 from mjcartpole.envs.gym_task import GymTask
-from mjcartpole.envs.registration import ENV_ID
+from mjcartpole.envs.registration import ENV_ID, env_id
 from mjcartpole.errors import ConfigError, check_known
 from mjcartpole.integrator import Integrator, check_integrator
-from mjcartpole.task import CARTPOLE_V1, Task, resolve
+from mjcartpole.task import CARTPOLE_V1, CONTINUOUS, Task, resolve
 
 if TYPE_CHECKING:
     from mjcartpole.physics.load import ModelLike
@@ -64,7 +64,7 @@ def make_env(
         env = gymnasium.make(GYM_ID, max_episode_steps=rules.time_limit, disable_env_checker=True)
         return env if rules is CARTPOLE_V1 else GymTask(env, rules)
     return gymnasium.make(
-        ENV_ID,
+        env_id(CONTINUOUS) if rules.continuous else ENV_ID,
         max_episode_steps=rules.time_limit,
         disable_env_checker=True,
         model=model,

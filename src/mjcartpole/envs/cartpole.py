@@ -7,15 +7,16 @@ from typing import Any, Self
 import gymnasium
 import numpy as np
 import numpy.typing as npt
-from gymnasium import logger, spaces
+from gymnasium import logger
 from gymnasium.envs.registration import EnvSpec
 
+from mjcartpole.envs.actions import STEP_AFTER_END, action_space, invalid
 from mjcartpole.envs.editable import Editable
 from mjcartpole.envs.names import CartPoleNames, refuse_slip
 from mjcartpole.envs.options import reset_options, usual
 from mjcartpole.envs.pictures import Pictures, RenderMode, warn_without_mode
 from mjcartpole.envs.spec import portable
-from mjcartpole.errors import InvalidActionError, ResetNeededError
+from mjcartpole.errors import ConfigError, ResetNeededError
 from mjcartpole.integrator import Integrator
 from mjcartpole.media.renderer import DEFAULT_HEIGHT, DEFAULT_WIDTH
 from mjcartpole.media.scene import DEFAULT_CAMERA
@@ -26,23 +27,14 @@ from mjcartpole.physics.simulation import FARTHEST_SANE, Simulation, State, as_s
 from mjcartpole.task import (
     CARTPOLE_V1,
     CONSTANT,
-    N_ACTIONS,
     Task,
     frame_rate,
     resolve,
-    wrap_angles,
 )
 
 # What `step` needs, as plain globals: the fewest look-ups and no sign to change.
 _INT64 = np.int64
 _FARTHEST = FARTHEST_SANE
-
-_STEP_AFTER_END = (
-    "You are calling 'step()' even though this environment has already returned "
-    "terminated = True. You should always call 'reset()' once you receive "
-    "'terminated = True' -- any further steps are undefined behavior."
-)
-
 
 _WIRES = ("_move", "_middle", "_advance", "_at_hand")
 """What a copy makes anew: functions and views that hold on to one simulation."""
@@ -187,9 +179,11 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int], CartPo
         self._simulation: Simulation | None = None
         rules = resolve(task)
         self._task = rules.with_sutton_barto_reward() if sutton_barto_reward else rules
+        if self._task.continuous and type(self) is CartPoleEnv:
+            raise ConfigError(f"{self._task.name} takes pushes; see ContinuousCartPoleEnv")
         self._usual = usual(self._task)
         self._set_limits(self._task.x_limit, self._task.theta_limit)
-        self.action_space = spaces.Discrete(N_ACTIONS)
+        self.action_space = action_space(self._task)
         self.render_mode = render_mode
         self._pictures = Pictures(cartpole, render_mode, width, height, camera, self._task)
         self._advance: Callable[[float], State] = _needs_reset
@@ -229,8 +223,7 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int], CartPo
         observation = np.zeros(4, dtype=np.float32)
         # A view that takes single floats several times faster than the array does.
         cells: memoryview[float] = observation.data.cast("B").cast("f")
-        observe_poles = simulation.observe_turning if self._task.turns else simulation.observe
-        observe = observation.copy if poles == 1 else observe_poles
+        observe = observation.copy if poles == 1 else simulation.observer(self._task)
         self._at_hand = (*self._limits, cells, observe, CONSTANT.get(self._task.reward))
 
     def _set_limits(self, x: float, theta: float) -> None:
@@ -298,14 +291,14 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int], CartPo
         # out before it is called, since `self.name()` looks for a method in all classes first.
         kind = type(action)
         if kind is not int and kind is not _INT64 and not self.action_space.contains(action):
-            raise _invalid(action)
+            raise invalid(action)
         # A numpy integer tells whether it is zero much sooner than whether it equals one.
         if not action:
             control = self._left
         elif action == 1:
             control = self._right
         else:
-            raise _invalid(action)
+            raise invalid(action)
         advance = self._advance
         x, x_dot, theta, theta_dot = advance(control)
         x_min, x_max, theta_min, theta_max, cells, observe, reward = self._at_hand
@@ -337,7 +330,7 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int], CartPo
             count[0] = 0
             return self._task.reward(*state, True)
         if count[0] == 0:
-            logger.warn(_STEP_AFTER_END)
+            logger.warn(STEP_AFTER_END)
         count[0] += 1
         # Nothing is earned after the end.
         return min(0.0, self._task.reward(*state, True))
@@ -373,8 +366,7 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int], CartPo
         self._steps_after_end[0] = None
         if self.render_mode == "human":
             self.render()
-        seen = wrap_angles(state) if self._task.turns else state
-        return seen.astype(np.float32), {}
+        return self._task.seen(state).astype(np.float32), {}
 
     def render(self) -> npt.NDArray[np.uint8] | None:
         """Draw the current state.
@@ -403,7 +395,3 @@ class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int], CartPo
 
 def _needs_reset(control: float) -> State:
     raise ResetNeededError("Call reset before using step method.")
-
-
-def _invalid(action: object) -> InvalidActionError:
-    return InvalidActionError(f"{action!r} ({type(action)}) invalid; the actions are 0 and 1")

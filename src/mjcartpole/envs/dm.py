@@ -24,7 +24,6 @@ from mjcartpole.task import (
     TASKS,
     Task,
     worst_pole,
-    wrap_angles,
 )
 
 try:
@@ -229,24 +228,20 @@ class Balance(control.Task):  # type: ignore[misc]
         self, physics: Physics
     ) -> "collections.OrderedDict[str, npt.NDArray[np.float64]]":
         """The state, positions and velocities apart."""
-        state = self._seen(physics)
+        state = self._rules.seen(physics.state)
         return collections.OrderedDict(position=state[0::2], velocity=state[1::2])
 
     def get_reward(self, physics: Physics) -> float:
         """Return the task's reward: of CartPole-v1, 1 for every step."""
-        x, x_dot, theta, theta_dot = worst_pole(self._seen(physics).tolist())
+        x, x_dot, theta, theta_dot = worst_pole(self._rules.seen(physics.state).tolist())
         return self._rules.reward(x, x_dot, theta, theta_dot, self._rules.has_ended(x, theta))
 
     def get_termination(self, physics: Physics) -> float | None:
         """Return the discount of the step that ends an episode; None while it goes on."""
-        x, _, theta, _ = worst_pole(self._seen(physics).tolist())
+        x, _, theta, _ = worst_pole(self._rules.seen(physics.state).tolist())
         if self._rules.has_ended(x, theta):
             return 0.0
         return 1.0 if self.steps >= self._limit else None
-
-    def _seen(self, physics: Physics) -> npt.NDArray[np.float64]:
-        """The state as rules and observations have it."""
-        return wrap_angles(physics.state) if self._rules.turns else physics.state
 
     def _show_reward(self, physics: Physics) -> None:
         if self._visualize_reward:

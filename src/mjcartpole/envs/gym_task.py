@@ -7,7 +7,9 @@ import numpy as np
 import numpy.typing as npt
 from gymnasium import spaces
 
-from mjcartpole.task import Task, wrap_angles, wrapped
+from mjcartpole.envs.actions import action_space, push_of
+from mjcartpole.physics.cartpole_v1 import FORCE
+from mjcartpole.task import Task, control_of, wrapped
 
 Observation = npt.NDArray[np.float32]
 
@@ -26,6 +28,7 @@ class GymTask(gymnasium.Wrapper[Observation, np.int64, Observation, np.int64]):
         self._cartpole.x_threshold = task.x_limit  # type: ignore[attr-defined]
         self._cartpole.theta_threshold_radians = task.theta_limit  # type: ignore[attr-defined]
         bound = task.observation_bound()
+        self.action_space = action_space(task)
         self.observation_space = spaces.Box(-bound, bound, dtype=np.float32)
 
     def reset(
@@ -40,8 +43,16 @@ class GymTask(gymnasium.Wrapper[Observation, np.int64, Observation, np.int64]):
             self._cartpole.state = state  # type: ignore[attr-defined]
         return self._seen(observation), info
 
-    def step(self, action: np.int64) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        """Advance one control step; the reward is the task's."""
+    def step(self, action: Any) -> tuple[Observation, float, bool, bool, dict[str, Any]]:  # noqa: ANN401
+        """Advance one control step; the reward is the task's.
+
+        Raises:
+            InvalidActionError: A push is none.
+        """
+        if self._task.continuous:
+            # Action 1 has the push of this step.
+            self._cartpole.force_mag = control_of(push_of(action), (-FORCE, FORCE))  # type: ignore[attr-defined]
+            action = 1
         observation, _, terminated, truncated, info = self.env.step(action)
         x, x_dot, theta, theta_dot = map(float, self._cartpole.state)  # type: ignore[attr-defined]
         if self._task.turns:
@@ -54,4 +65,4 @@ class GymTask(gymnasium.Wrapper[Observation, np.int64, Observation, np.int64]):
         if not (self._task.turns or self._task.start_angle):
             return observation
         state = np.array(self._cartpole.state, dtype=np.float64)  # type: ignore[attr-defined]
-        return (wrap_angles(state) if self._task.turns else state).astype(np.float32)
+        return self._task.seen(state).astype(np.float32)

@@ -14,6 +14,8 @@ def env_id(rules: Task) -> str:
     return f"mjcartpole/{rules.name}"
 
 
+_CONTINUOUS: Final = "mjcartpole.envs.continuous:ContinuousCartPoleEnv"
+
 ENV_ID: Final = env_id(CARTPOLE_V1)
 
 
@@ -46,7 +48,7 @@ def register_task(rules: Task) -> Task:
 def _register(rules: Task) -> None:
     gymnasium.register(
         id=env_id(rules),
-        entry_point="mjcartpole.envs.cartpole:CartPoleEnv",
+        entry_point=_CONTINUOUS if rules.continuous else "mjcartpole.envs.cartpole:CartPoleEnv",
         vector_entry_point="mjcartpole.envs.vector:CartPoleVectorEnv",
         max_episode_steps=rules.time_limit,
         reward_threshold=rules.reward_threshold,

@@ -10,10 +10,11 @@ from gymnasium import logger, spaces
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
+from mjcartpole.envs.actions import action_space, controls_of_all
 from mjcartpole.envs.names import FixedNames
 from mjcartpole.envs.options import start_bounds
 from mjcartpole.envs.registration import ENV_ID
-from mjcartpole.errors import ConfigError, InvalidActionError, ResetNeededError
+from mjcartpole.errors import ConfigError, ResetNeededError
 from mjcartpole.integrator import Integrator
 from mjcartpole.media.renderer import DEFAULT_HEIGHT, DEFAULT_WIDTH, Renderer, open_renderer
 from mjcartpole.media.scene import DEFAULT_CAMERA, check_picture
@@ -23,13 +24,11 @@ from mjcartpole.physics.load import Edits, ModelLike, load_model
 from mjcartpole.task import (
     CARTPOLE_V1,
     CONSTANT,
-    N_ACTIONS,
     Task,
     frame_rate,
     resolve,
     state_names,
     worst_pole,
-    wrap_angles,
 )
 
 VectorRenderMode = Literal["rgb_array", "rgb_array_list"]
@@ -155,15 +154,15 @@ class CartPoleVectorEnv(
         self.render_mode = render_mode
         self.cartpole = load_model(model, edits, own_timestep=own_timestep)
         self._simulation = BatchSimulation(self.cartpole, self.num_envs, integrator, threads)
-        self._controls = np.array(self.cartpole.controls)
         if render_mode is not None or (width, height, camera) != _DEFAULT_PICTURE:
             check_picture(self.cartpole, width, height, camera)
         self.metadata = self.metadata | {"render_fps": frame_rate(self.cartpole.control_step)}
         bound = self._task.observation_bound(self.cartpole.poles)
         self.single_observation_space = spaces.Box(-bound, bound, dtype=np.float32)
-        self.single_action_space = spaces.Discrete(N_ACTIONS)
+        self.single_action_space = action_space(self._task)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
+        self._controls_of = controls_of_all(self._task, self.action_space, self.cartpole.controls)
         self._prepare_episodes()
         self._open_renderer = functools.partial(
             open_renderer, self.cartpole, width=width, height=height, camera=camera, task=self._task
@@ -241,7 +240,7 @@ class CartPoleVectorEnv(
         self._has_state = True
         self._deadlines[who] = self._clock + self.max_episode_steps
         self._ended = np.setdiff1d(self._ended, who, assume_unique=True)
-        return self._seen().astype(np.float32), {}
+        return self._task.seen(self._simulation.state).astype(np.float32), {}
 
     def _mask(self, mask: object) -> npt.NDArray[np.intp]:
         """Indices of the environments that a reset is for."""
@@ -273,7 +272,8 @@ class CartPoleVectorEnv(
         """Advance one control step; restart environments whose episode ended in the step before.
 
         Args:
-            actions: Integers of shape (num_envs,).
+            actions: Integers of shape (num_envs,); of a task that takes pushes, these, float32 of
+                shape (num_envs, 1).
 
         Returns:
             Observations, shape (num_envs, 4) with one pole; rewards, terminations and truncations,
@@ -284,7 +284,7 @@ class CartPoleVectorEnv(
             ResetNeededError: There is no state yet.
             SimulationError: The physics of an environment diverged; all need a reset.
         """
-        controls = self._controls.take(self._valid(actions))
+        controls = self._controls_of(actions)
         if not self._has_state:
             raise ResetNeededError("Call reset before using step method.")
         self._simulation.step(controls)
@@ -301,29 +301,13 @@ class CartPoleVectorEnv(
             rewards[restarted] = 0.0
             terminations[restarted] = False
         self._ended = np.logical_or(terminations, truncations).nonzero()[0]
-        return self._seen().astype(np.float32), rewards, terminations, truncations, {}
-
-    def _seen(self) -> npt.NDArray[np.float64]:
-        """The states as rules and observations have them, one row each."""
-        states = self._simulation.state
-        return wrap_angles(states) if self._task.turns else states
-
-    def _valid(self, actions: npt.ArrayLike) -> npt.NDArray[np.integer[Any]]:
-        """The actions as an array, if `action_space.contains` them."""
-        if (
-            isinstance(actions, np.ndarray)
-            and actions.dtype.kind == "i"
-            and actions.shape == (self.num_envs,)
-            # Together they have no bit but the lowest: each is 0 or 1.
-            and np.bitwise_or.reduce(actions) in (0, 1)
-        ):
-            return actions
-        if not self.action_space.contains(actions):
-            raise InvalidActionError(
-                f"{actions!r} ({type(actions)}) invalid; "
-                f"actions are {self.num_envs} integers, each 0 or 1"
-            )
-        return np.asarray(actions)
+        return (
+            self._task.seen(self._simulation.state).astype(np.float32),
+            rewards,
+            terminations,
+            truncations,
+            {},
+        )
 
     def _have_terminated(self) -> npt.NDArray[np.bool_]:
         """Whose state is beyond a limit, shape (num_envs,); a new array."""
@@ -340,7 +324,9 @@ class CartPoleVectorEnv(
             if terminations.any():
                 rewards[terminations] = reward(0.0, 0.0, 0.0, 0.0, True)
             return rewards
-        pairs = zip(self._seen().tolist(), terminations.tolist(), strict=True)
+        pairs = zip(
+            self._task.seen(self._simulation.state).tolist(), terminations.tolist(), strict=True
+        )
         values = [reward(*worst_pole(state), over) for state, over in pairs]
         return np.array(values, dtype=np.float32)
 

@@ -127,7 +127,8 @@ class TrainConfig:
             self.backend, self.model, self.integrator, self.set, own_timestep=self.own_timestep
         )
         object.__setattr__(self, "task", resolve(self.task).name)
-        _ = self.rules
+        if self.rules.continuous:
+            raise ConfigError(f"a table chooses between two actions; {self.task} takes any push")
         self._check_counts()
         self._check_until()
         self._check_dimensions()

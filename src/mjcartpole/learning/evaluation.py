@@ -13,6 +13,7 @@ from mjcartpole.envs.backend import GYM_ID, Backend, check_backend, make_env
 from mjcartpole.errors import ConfigError
 from mjcartpole.integrator import Integrator
 from mjcartpole.learning.config import TrainConfig
+from mjcartpole.learning.controllers import Controller
 from mjcartpole.learning.engine import Engine, choose_engine
 from mjcartpole.learning.episodes import ENDINGS, Episode
 from mjcartpole.learning.loop import play_episode
@@ -28,6 +29,8 @@ SEED: Final = 1_000_000
 """Default seed of evaluations, far from the small ones that people train with."""
 
 PolicyLike = Callable[[npt.NDArray[np.float32]], int]
+Player = Policy | Controller
+"""What is played by name or from a file."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -123,8 +126,9 @@ def evaluate(
         engine, poles, name = choose_engine(engine, backend, model, rules), model.poles, model.name
     else:
         engine, poles, name = choose_engine(engine, backend, task=rules), 1, GYM_ID
-    if isinstance(policy, Policy):
+    if isinstance(policy, Policy | Controller):
         policy.check_fits(poles, name)
+    play = player(policy, rules)
     if engine == "compiled" and isinstance(policy, Policy):
         from mjcartpole.learning.compiled import CompiledLoop  # noqa: PLC0415 - it is heavy
 
@@ -133,11 +137,22 @@ def evaluate(
         return Evaluation(backend, seed, tuple(log))
     env = make_env(backend, model, integrator, rules)
     played = tuple(
-        play_episode(env, policy, number=number, seed=seed if number == 0 else None)[0]
+        play_episode(env, play, number=number, seed=seed if number == 0 else None)[0]
         for number in range(episodes)
     )
     env.close()
     return Evaluation(backend, seed, played)
+
+
+def player(policy: PolicyLike, task: Task) -> Callable[[npt.NDArray[np.float32]], Any]:
+    """Return what chooses the actions of a task by a policy.
+
+    Raises:
+        ConfigError: The policy is a table, and the task takes any push.
+    """
+    if task.continuous and isinstance(policy, Policy):
+        raise ConfigError(f"a table chooses between two actions; {task.name} takes any push")
+    return policy.push if task.continuous and isinstance(policy, Controller) else policy
 
 
 def evaluate_where_trained(

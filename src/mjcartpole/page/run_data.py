@@ -47,8 +47,8 @@ def run_data(setup: PolicySetup, told: Told, backend: str) -> dict[str, Any]:
         "own_timestep": not math.isclose(cartpole.control_step, CONTROL_STEP),
         "parts": _parts(cartpole),
         "task": _rules(setup.task),
-        "grid": _grid(setup.policy),
-        "table": packed(setup.policy.q_table),
+        "grid": _grid(setup.table),
+        "table": packed(setup.table.q_table),
         "episode": {
             "states": packed(rollout.states),
             "ending": rollout.episode.ending,

@@ -98,13 +98,9 @@ class Simulation:
         for place, joint in self._places:
             self._qpos[joint], self._qvel[joint] = state[place], state[place + 1]
 
-    def observe(self) -> npt.NDArray[np.float32]:
-        """Return the state as an observation, shape (size,)."""
-        return self.state.astype(np.float32)
-
-    def observe_turning(self) -> npt.NDArray[np.float32]:
-        """Return the same where poles may turn right round."""
-        return task.wrap_angles(self.state).astype(np.float32)
+    def observer(self, rules: task.Task) -> Callable[[], npt.NDArray[np.float32]]:
+        """Return what observes the state by the rules of a task, shape (size,)."""
+        return lambda: rules.seen(self.state).astype(np.float32)
 
     def steps(self, states: Vector, controls: Vector) -> Vector:
         """Return the states after one control step from each of many.
@@ -271,7 +267,7 @@ def as_seen(simulation: Simulation, rules: task.Task) -> Callable[[float], State
         return task.worst_pole(step(control))
 
     def turn_poles(control: float) -> State:
-        return task.worst_pole(task.wrap_angles(np.array(step(control))).tolist())
+        return task.worst_pole(rules.seen(np.array(step(control))).tolist())
 
     if is_one:
         return turn if rules.turns else step

@@ -44,7 +44,7 @@ def basin(
     """
     if not 2 <= points <= MOST_POINTS:
         raise ConfigError(f"points must be a whole number from 2 to {MOST_POINTS:,}, not {points}")
-    policy, task = setup.policy, setup.task
+    policy, task = setup.table, setup.task
     policy.check_fits(setup.cartpole.poles, setup.cartpole.name)
     axes = choose_axes(policy.discretizer, dims, "none", at)
     a, b = (np.linspace(*_range(axes, place, setup), points + 1) for place in axes.dims)
@@ -65,7 +65,7 @@ def basin(
 def _range(axes: Axes, dimension: int, setup: PolicySetup) -> tuple[float, float]:
     """Return from where to where starts lie: up to the limit, or as far as the table reaches."""
     limit = limit_along(dimension, setup.task)
-    grid = setup.policy.discretizer
+    grid = setup.table.discretizer
     return (-limit, limit) if limit else (grid.low[dimension], grid.high[dimension])
 
 
@@ -85,7 +85,7 @@ def survival(setup: PolicySetup, starts: Floats) -> npt.NDArray[np.int64]:
     Raises:
         SimulationError: The physics diverged.
     """
-    grid, table, task = setup.policy.discretizer, setup.policy.q_table, setup.task
+    grid, table, task = setup.table.discretizer, setup.table.q_table, setup.task
     step = _mover(setup, starts)
     states, lasting = starts, np.ones(len(starts), np.bool_)
     steps = np.zeros(len(starts), np.int64)

@@ -12,8 +12,9 @@ import numpy.typing as npt
 
 from mjcartpole.envs.backend import make_env
 from mjcartpole.learning.episodes import ENDINGS, Episode
-from mjcartpole.learning.evaluation import check_count
+from mjcartpole.learning.evaluation import check_count, player
 from mjcartpole.learning.loop import play_episode
+from mjcartpole.learning.policy import Policy
 from mjcartpole.media.hud import Moment
 from mjcartpole.media.montage import equally_spaced, sheet, side_by_side, state_at, time_label
 from mjcartpole.media.overlay import Overlay
@@ -50,7 +51,8 @@ class Rollout:
     def totals(self) -> list[float]:
         """The return so far at each state, shape (steps + 1,)."""
         rewards, last = [0.0], len(self.states) - 1
-        for step, state in enumerate(self.states.tolist()[1:], start=1):
+        seen = self.setup.task.seen(self.states).tolist()
+        for step, state in enumerate(seen[1:], start=1):
             terminated = step == last and self.episode.ending != ENDINGS[0]
             rewards.append(self.setup.task.reward(*worst_pole(state), terminated))
         return list(itertools.accumulate(rewards))
@@ -61,10 +63,9 @@ class Rollout:
         state = state_at(self.states, place)
         if step >= self.episode.steps:
             return Moment(self.episode.steps, self.episode.total, state)
-        observation = self.states[step].astype(np.float32)
-        return Moment(
-            step, self.totals[step], state, policy(observation), policy.values(observation)
-        )
+        observation = self.setup.task.seen(self.states[step]).astype(np.float32)
+        values = policy.values(observation) if isinstance(policy, Policy) else None
+        return Moment(step, self.totals[step], state, policy(observation), values)
 
 
 def play(setup: PolicySetup, episodes: int = 1) -> list[Rollout]:
@@ -77,13 +78,13 @@ def play(setup: PolicySetup, episodes: int = 1) -> list[Rollout]:
     """
     check_count(episodes, setup.seed)
     setup.policy.check_fits(setup.cartpole.poles, setup.cartpole.name)
-    takes = []
+    act, takes = player(setup.policy, setup.task), []
     with contextlib.closing(
         make_env(setup.backend, setup.model, setup.integrator, setup.task)
     ) as env:
         for number in range(episodes):
             seed = setup.seed if number == 0 else None
-            episode, states = play_episode(env, setup.policy, number=number, seed=seed)
+            episode, states = play_episode(env, act, number=number, seed=seed)
             takes.append(Rollout(setup, episode, np.array(states)))
     return takes
 

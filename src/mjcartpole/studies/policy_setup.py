@@ -1,5 +1,6 @@
 """A policy and where it is played: as it was trained, unless something else is asked for."""
 
+import dataclasses
 import functools
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,7 +12,8 @@ from mjcartpole.files import is_file
 from mjcartpole.integrator import Integrator
 from mjcartpole.learning import evaluation, runs
 from mjcartpole.learning.config import TrainConfig
-from mjcartpole.learning.evaluation import SEED
+from mjcartpole.learning.controllers import Controller, controller
+from mjcartpole.learning.evaluation import SEED, Player
 from mjcartpole.learning.policy import Policy
 from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.load import ModelLike, load_model
@@ -28,7 +30,7 @@ class PolicySetup:
 
     Attributes:
         name: What a person calls it.
-        policy: The policy.
+        policy: A table's, or a controller.
         backend: Who does the physics.
         model: What moves, for backend mujoco; gymnasium's cart-pole is drawn as the reference.
         integrator: See `Simulation`.
@@ -37,7 +39,7 @@ class PolicySetup:
     """
 
     name: str
-    policy: Policy
+    policy: Player
     backend: Backend = "mujoco"
     model: ModelLike = "cartpole"
     integrator: Integrator = "gym"
@@ -49,6 +51,17 @@ class PolicySetup:
         """What is drawn."""
         return load_model(self.model)
 
+    @property
+    def table(self) -> Policy:
+        """The policy, of a table.
+
+        Raises:
+            ConfigError: It is a controller.
+        """
+        if isinstance(self.policy, Controller):
+            raise ConfigError(f"{self.name} is a controller, which has no table")
+        return self.policy
+
 
 def find_setup(source: Path, target: EvalTarget = WHERE_TRAINED) -> PolicySetup:
     """Find a policy, and where to play it: as it was trained, unless the target says otherwise.
@@ -56,9 +69,33 @@ def find_setup(source: Path, target: EvalTarget = WHERE_TRAINED) -> PolicySetup:
     Raises:
         MjCartPoleError: Something cannot be used.
     """
+    name, policy, config, run = _read(source, target)
+    return _placed(name, policy, config, run, target)
+
+
+def controller_setup(name: str, target: EvalTarget = WHERE_TRAINED) -> PolicySetup:
+    """Make a controller for where it is played, on the reference model unless the target says so.
+
+    Raises:
+        MjCartPoleError: Something cannot be used, or no controller has that name.
+    """
+    if target.allow_assets:
+        raise ConfigError("--allow-assets is for the model of a run; a controller has none")
+    anybody = controller("constant")
+    setup = _placed(name, anybody, TrainConfig(), None, target)
+    made = controller(name, setup.cartpole, setup.integrator)
+    return dataclasses.replace(setup, policy=made)
+
+
+def _placed(
+    name: str,
+    policy: Player,
+    config: TrainConfig,
+    run: runs.Run | None,
+    target: EvalTarget,
+) -> PolicySetup:
     seed = evaluation.SEED if target.seed is None else target.seed
     evaluation.check_count(1, seed)
-    name, policy, config, run = _read(source, target)
     backend = target.backend or config.backend
     own_model = str(run.model) if run else config.model
     if backend == "gym":

@@ -102,7 +102,7 @@ def table(
     Raises:
         ConfigError: There is no such dimension, or one is asked for twice.
     """
-    policy = setup.policy
+    policy = setup.table
     axes = choose_axes(policy.discretizer, dims, over, at)
     a, b = (limit_along(dimension, setup.task) for dimension in axes.dims)
     return slices(setup.name, policy.discretizer, policy.q_table, axes, shown=shown, limits=(a, b))
@@ -127,7 +127,7 @@ def phase(
         ConfigError: There is no such dimension, or no episode.
         SimulationError: The physics diverged.
     """
-    policy = setup.policy
+    policy = setup.table
     axes = choose_axes(policy.discretizer, dims, "none", at)
     takes = play(setup, episodes)
     paths = [
@@ -174,7 +174,7 @@ def _endings(group: Group, episodes: int) -> Endings:
     for record in records:
         setup = find_setup(record.folder)
         played = evaluate(
-            setup.policy,
+            setup.table,
             backend=setup.backend,
             model=setup.model,
             integrator=setup.integrator,

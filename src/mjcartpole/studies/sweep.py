@@ -11,8 +11,7 @@ import numpy.typing as npt
 
 from mjcartpole.errors import ConfigError
 from mjcartpole.integrator import Integrator
-from mjcartpole.learning.evaluation import EPISODES, SEED, check_count
-from mjcartpole.learning.policy import Policy
+from mjcartpole.learning.evaluation import EPISODES, SEED, Player, check_count
 from mjcartpole.physics.edit.edits import edits_of
 from mjcartpole.physics.load import Edits, ModelLike, load_model
 from mjcartpole.studies.transfer import GYM, Cell, TransferResult, find_place, transfer
@@ -147,7 +146,7 @@ def parse_sweep(text: str) -> tuple[str, tuple[float, ...]]:
 
 
 def sweep(
-    policies: Mapping[str, Policy | Sequence[Policy]],
+    policies: Mapping[str, Player | Sequence[Player]],
     model: ModelLike,
     key: str,
     values: Sequence[float],

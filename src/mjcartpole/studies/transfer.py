@@ -12,8 +12,7 @@ from mjcartpole.cores import worker_count
 from mjcartpole.envs.backend import Backend
 from mjcartpole.errors import ConfigError, MjCartPoleError
 from mjcartpole.integrator import Integrator
-from mjcartpole.learning.evaluation import EPISODES, SEED, Evaluation, check_count, evaluate
-from mjcartpole.learning.policy import Policy
+from mjcartpole.learning.evaluation import EPISODES, SEED, Evaluation, Player, check_count, evaluate
 from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.load import Edits, ModelLike, load_model
 from mjcartpole.studies.statistics import Interval, bootstrap_interval
@@ -163,7 +162,7 @@ def find_place(
 
 
 def transfer(
-    policies: Mapping[str, Policy | Sequence[Policy]],
+    policies: Mapping[str, Player | Sequence[Player]],
     places: Sequence[Place | ModelLike],
     *,
     task: Task | str = CARTPOLE_V1,
@@ -194,7 +193,7 @@ def transfer(
         raise ConfigError("a transfer needs one policy and one model at least")
     found = [place if isinstance(place, Place) else find_place(place) for place in places]
     groups = {
-        name: (group,) if isinstance(group, Policy) else tuple(group)
+        name: tuple(group) if isinstance(group, Sequence) else (group,)
         for name, group in policies.items()
     }
     pairs = [(name, place) for name in groups for place in found]
@@ -218,7 +217,7 @@ def transfer(
 
 
 def _play(
-    name: str, policies: Sequence[Policy], place: Place, rules: Task, episodes: int, seed: int
+    name: str, policies: Sequence[Player], place: Place, rules: Task, episodes: int, seed: int
 ) -> Cell:
     try:
         played = [
