@@ -7,12 +7,14 @@
 
 Each seed is trained alone, then its greedy policy plays 100 episodes from fresh starting states.
 `last 2000` is the mean return over the last 2,000 training episodes (all, if there are fewer).
+`upright` counts the starts after which all poles stand through the last 100 steps.
 `endless` lets the greedy policy play on for --steps from each of --starts fresh starting states.
 Seeds start at --first-seed, so that settings chosen on some seeds can be confirmed on others.
 """
 
 import argparse
 import json
+import math
 import multiprocessing
 import time
 from multiprocessing.pool import Pool
@@ -24,10 +26,14 @@ import numpy.typing as npt
 
 from mjcartpole.cores import available_cores
 from mjcartpole.learning.config import TrainConfig
+from mjcartpole.learning.episodes import ENDINGS
 from mjcartpole.learning.evaluation import SEED, evaluate, evaluate_where_trained
 from mjcartpole.learning.policy import Policy
 from mjcartpole.learning.presets import PRESETS
 from mjcartpole.learning.training import train
+from mjcartpole.studies.film import play
+from mjcartpole.studies.policy_setup import PolicySetup
+from mjcartpole.task import CARTPOLE_V1
 
 # What was tried around `tuned`: each entry changes its defaults.
 ONE_STEP = {
@@ -85,8 +91,12 @@ TABLES = {
     "presets": PRESETS,
     "variants": VARIANTS,
     "bins": BINS,
+    "upright": PRESETS,
     "endless": PRESETS | AROUND_ENDLESS,
 }
+
+LEAN = 2 * CARTPOLE_V1.theta_limit
+"""A pole that leans less stands, rad."""
 
 PART = 50  # starts that are played with one seed
 
@@ -161,6 +171,27 @@ def play_on(part: tuple[TrainConfig, Policy, int, int]) -> npt.NDArray[np.int64]
     return np.array([episode.steps for episode in played.episodes])
 
 
+def upright(options: argparse.Namespace, pool: Pool) -> list[dict[str, Any]]:
+    """Train every seed, and count the starts after which the poles stand at the end."""
+    jobs = [(name, config, options.starts) for name, config in make_jobs(options)]
+    rows = []
+    for (name, config, _), stood in zip(jobs, pool.imap(stand, jobs), strict=True):
+        print(f"{name:36s} {config.backend:7s} seed {config.seed}: {stood} of {options.starts}")
+        rows.append({"name": name, "backend": config.backend, "seed": config.seed, "stood": stood})
+    print(f"all: {np.mean([row['stood'] for row in rows]) / options.starts:.2%}")
+    return rows
+
+
+def stand(job: tuple[str, TrainConfig, int]) -> int:
+    """Train one seed; returns after how many starts the poles lean less than `LEAN` to the end."""
+    name, config, starts = job
+    policy = train(config).policy
+    model = config.load_model() if config.backend == "mujoco" else "cartpole"
+    setup = PolicySetup(name, policy, config.backend, model, config.integrator, task=config.rules)
+    takes = [take for take in play(setup, starts) if take.episode.ending == ENDINGS[0]]
+    return sum(bool((np.cos(take.states[-100:, 2::2]) > math.cos(LEAN)).all()) for take in takes)
+
+
 def make_jobs(options: argparse.Namespace) -> list[Job]:
     """All trainings that were asked for."""
     table = TABLES[options.what]
@@ -220,7 +251,7 @@ def main() -> None:
     parser.add_argument("--workers", type=int, default=available_cores())
     parser.add_argument("--json", type=Path, help="write every seed's figures here")
     options = parser.parse_args()
-    measured = endless if options.what == "endless" else reliability
+    measured = {"endless": endless, "upright": upright}.get(options.what, reliability)
     with multiprocessing.Pool(options.workers) as pool:
         rows = measured(options, pool)
     if options.json:
