@@ -8,7 +8,7 @@ import numpy.typing as npt
 from gymnasium import spaces
 
 from mjcartpole.learning.fitted import Fitted, Linear, Seen, linear_step, rod_step
-from mjcartpole.task import N_ACTIONS, Task, wrap_angles
+from mjcartpole.task import N_ACTIONS, Task
 
 Observation = npt.NDArray[np.float32]
 
@@ -80,5 +80,4 @@ class Dream(gymnasium.Env[Observation, np.int64]):
 
     def _seen(self) -> npt.NDArray[np.float64]:
         """The state; of a pole that may turn right round, the angle counts from -pi to pi."""
-        state = np.array(self.state)
-        return wrap_angles(state) if self._task.turns else state
+        return self._task.seen(np.array(self.state))
