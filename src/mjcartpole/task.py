@@ -229,7 +229,7 @@ def resolve(task: Task | str) -> Task:
     return task if isinstance(task, Task) else task_named(task)
 
 
-def control_of(push: Number, controls: tuple[float, float]) -> Number:
+def control_of(push: Number, controls: Sequence[float] | npt.NDArray[np.float64]) -> Number:
     """Return the control of a push from -1 to 1, between those of the two actions.
 
     >>> control_of(0.0, (-1.0, 1.0))

@@ -1,6 +1,5 @@
 """Actions: their spaces, and what the motor makes of them."""
 
-from collections.abc import Callable
 from typing import Any, Final
 
 import numpy as np
@@ -36,52 +35,53 @@ def push_of(action: npt.ArrayLike) -> float:
     Raises:
         InvalidActionError: It is none.
     """
-    pushes = _pushes(action, 1)
+    pushes = _pushes(action)
     if pushes is None or pushes.shape != (1,):
         raise invalid(action, "an action is a push from -1 to 1, shape (1,)")
     return float(pushes[0])
 
 
-def _pushes(actions: npt.ArrayLike, n: int) -> npt.NDArray[np.float64] | None:
-    """Return n numbers from -1 to 1, as they are; None if they are something else."""
+def _pushes(actions: npt.ArrayLike) -> npt.NDArray[np.float64] | None:
+    """Return numbers from -1 to 1, as they are; None if they are something else."""
     pushes = np.asarray(actions)
-    is_one = pushes.dtype.kind in "fiu" and pushes.size == n and (np.abs(pushes) <= 1.0).all()
-    return pushes.astype(np.float64) if is_one else None
+    are_such = pushes.dtype.kind in "fiu" and (np.abs(pushes) <= 1.0).all()
+    return pushes.astype(np.float64) if are_such else None
 
 
 Controls = npt.NDArray[np.float64]
 
 
-def controls_of_all(
-    task: Task, space: spaces.Space[Any], controls: tuple[float, float]
-) -> Callable[[npt.ArrayLike], Controls]:
-    """Return what makes controls, shape (n,), of the actions of n environments.
-
-    It raises InvalidActionError for what is not in the space.
+def controls_of_pushes(
+    actions: npt.ArrayLike, space: spaces.Space[Any], controls: Controls
+) -> Controls:
+    """Return the controls of many pushes, shape (n,).
 
     Args:
-        task: Says which kind of actions.
-        space: All that they can be: shape (n,), or (n, 1) for pushes.
-        controls: Those of the two actions.
+        actions: Shape (n, 1).
+        space: All that they can be.
+        controls: Those of action 0 and 1.
+
+    Raises:
+        InvalidActionError: They are not in the space.
     """
-    n, ends = (space.shape or (0,))[0], np.array(controls)
+    n, pushes = (space.shape or (0,))[0], _pushes(actions)
+    if pushes is None or pushes.shape != space.shape:
+        raise invalid(actions, f"actions are {n} pushes from -1 to 1, shape ({n}, 1)")
+    return control_of(pushes[:, 0], controls)
 
-    def of_pushes(actions: npt.ArrayLike) -> Controls:
-        pushes = _pushes(actions, n)
-        if pushes is None or pushes.shape != (n, 1):
-            raise invalid(actions, f"actions are {n} pushes from -1 to 1, shape ({n}, 1)")
-        return control_of(pushes[:, 0], controls)
 
-    def of_choices(actions: npt.ArrayLike) -> Controls:
-        is_plain = (
-            isinstance(actions, np.ndarray)
-            and actions.dtype.kind == "i"
-            and actions.shape == (n,)
-            # Together they have no bit but the lowest: each is 0 or 1.
-            and np.bitwise_or.reduce(actions) in (0, 1)
-        )
-        if not is_plain and not space.contains(actions):
-            raise invalid(actions, f"actions are {n} integers, each 0 or 1")
-        return ends.take(np.asarray(actions))
-
-    return of_pushes if task.continuous else of_choices
+def controls_of_choices(
+    actions: npt.ArrayLike, space: spaces.Space[Any], controls: Controls
+) -> Controls:
+    """Do the same for actions that are 0 or 1, shape (n,)."""
+    is_plain = (
+        isinstance(actions, np.ndarray)
+        and actions.dtype.kind == "i"
+        and actions.shape == space.shape
+        # Together they have no bit but the lowest: each is 0 or 1.
+        and np.bitwise_or.reduce(actions) in (0, 1)
+    )
+    if not is_plain and not space.contains(actions):
+        n = (space.shape or (0,))[0]
+        raise invalid(actions, f"actions are {n} integers, each 0 or 1")
+    return controls.take(np.asarray(actions))

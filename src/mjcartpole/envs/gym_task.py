@@ -8,7 +8,6 @@ import numpy.typing as npt
 from gymnasium import spaces
 
 from mjcartpole.envs.actions import action_space, push_of
-from mjcartpole.physics.cartpole_v1 import FORCE
 from mjcartpole.task import Task, control_of, wrapped
 
 Observation = npt.NDArray[np.float32]
@@ -25,6 +24,7 @@ class GymTask(gymnasium.Wrapper[Observation, np.int64, Observation, np.int64]):
     def __init__(self, env: gymnasium.Env[Observation, np.int64], task: Task) -> None:
         super().__init__(env)
         self._task, self._cartpole = task, env.unwrapped
+        self._force: float = self._cartpole.force_mag  # type: ignore[attr-defined]
         self._cartpole.x_threshold = task.x_limit  # type: ignore[attr-defined]
         self._cartpole.theta_threshold_radians = task.theta_limit  # type: ignore[attr-defined]
         bound = task.observation_bound()
@@ -51,7 +51,7 @@ class GymTask(gymnasium.Wrapper[Observation, np.int64, Observation, np.int64]):
         """
         if self._task.continuous:
             # Action 1 has the push of this step.
-            self._cartpole.force_mag = control_of(push_of(action), (-FORCE, FORCE))  # type: ignore[attr-defined]
+            self._cartpole.force_mag = control_of(push_of(action), (-self._force, self._force))  # type: ignore[attr-defined]
             action = 1
         observation, _, terminated, truncated, info = self.env.step(action)
         x, x_dot, theta, theta_dot = map(float, self._cartpole.state)  # type: ignore[attr-defined]

@@ -10,7 +10,7 @@ from gymnasium import logger, spaces
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from mjcartpole.envs.actions import action_space, controls_of_all
+from mjcartpole.envs.actions import action_space, controls_of_choices, controls_of_pushes
 from mjcartpole.envs.names import FixedNames
 from mjcartpole.envs.options import start_bounds
 from mjcartpole.envs.registration import ENV_ID
@@ -162,7 +162,9 @@ class CartPoleVectorEnv(
         self.single_action_space = action_space(self._task)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
-        self._controls_of = controls_of_all(self._task, self.action_space, self.cartpole.controls)
+        interpret = controls_of_pushes if self._task.continuous else controls_of_choices
+        controls = np.array(self.cartpole.controls)
+        self._controls_of = functools.partial(interpret, space=self.action_space, controls=controls)
         self._prepare_episodes()
         self._open_renderer = functools.partial(
             open_renderer, self.cartpole, width=width, height=height, camera=camera, task=self._task
