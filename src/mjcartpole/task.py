@@ -279,6 +279,11 @@ def wrapped(theta: Number) -> Number:
     return theta - _TURN * ((theta + math.pi) // _TURN)
 
 
+def most_leaning(angles: Sequence[float]) -> float:
+    """Return the angle of largest size, with its sign; the first of equal ones."""
+    return max(angles, key=abs)
+
+
 def worst_pole(state: Sequence[float]) -> tuple[float, float, float, float]:
     """Return what the rules look at: the state itself, or of several poles the worst of all.
 

@@ -27,7 +27,7 @@ from mjcartpole.errors import CheckpointError
 from mjcartpole.files import atomic_write, brief, opened
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.documents import read_values
-from mjcartpole.learning.episodes import ENDINGS, Columns
+from mjcartpole.learning.episodes import ENDINGS, SIDES, Columns
 from mjcartpole.learning.greedy_curve import GreedyPoint
 from mjcartpole.learning.learner import Learner
 from mjcartpole.learning.stored import Fields, checked, parse
@@ -57,7 +57,7 @@ _INSTEAD: Final = "restore it from a copy, or start again with --overwrite"
 
 _FRAME: Final = 2**20
 """Bytes of a checkpoint beside its table and its columns, and more than enough."""
-_EPISODE_BYTES: Final = 13
+_EPISODE_BYTES: Final = 14
 _POINT: Final = len(GreedyPoint._fields)
 """Numbers of one evaluation, 8 bytes each."""
 
@@ -127,7 +127,7 @@ def load_checkpoint(
     """
     learner = Learner(config, config.discretizer(poles))
     most = sum(array.nbytes for array in learner.memory) + config.episodes * _EPISODE_BYTES + _FRAME
-    most += 8 * _most_numbers(config)
+    most += learner.visits.nbytes + 8 * _most_numbers(config)
     with opened(path, most, refusal=CheckpointError) as file:
         if not (line := file.readline(_LINE_LENGTH)).startswith(_HEAD):
             raise CheckpointError(
@@ -184,6 +184,8 @@ def _pack(checkpoint: Checkpoint) -> bytes:
     }
     if snapshot.evaluations:
         arrays["evaluations"] = np.array(snapshot.evaluations, np.float64).ravel()
+    if snapshot.visits is not None:
+        arrays["state_visits"] = snapshot.visits
     np.savez(archive, **arrays)
     content = archive.getvalue()
     return _line(hashlib.sha256(content).hexdigest()) + content
@@ -192,10 +194,13 @@ def _pack(checkpoint: Checkpoint) -> bytes:
 def _snapshot(
     archive: zipfile.ZipFile, about: dict[str, Any], config: TrainConfig, learner: Learner
 ) -> Snapshot:
+    totals = _array(archive, "totals", np.float64, config.episodes)
+    sides = _added(archive, "sides", np.int8, config.episodes)
     columns = Columns(
-        _array(archive, "totals", np.float64, config.episodes),
+        totals,
         _array(archive, "steps", np.int32, config.episodes),
         _array(archive, "endings", np.int8, config.episodes),
+        np.zeros(len(totals), np.int8) if sides is None else sides,
     )
     found = {
         name: _array(archive, name, array.dtype, array.size).reshape(array.shape)
@@ -203,8 +208,12 @@ def _snapshot(
     }
     learner.check(found)
     seconds, curve = float(about["seconds"]), _evaluations(archive, config)
-    snapshot = Snapshot(found, about["env_rng"], about["learner_rng"], columns, seconds, curve)
+    visits = _added(archive, "state_visits", np.int64, learner.visits.size)
+    states = about["env_rng"], about["learner_rng"]
+    snapshot = Snapshot(found, *states, columns, seconds, curve, visits)
     _check_snapshot(snapshot, config.evaluation_period)
+    if visits is not None:
+        check_visits(visits, learner.visits.size, int(columns.steps.sum()))
     return snapshot
 
 
@@ -215,13 +224,30 @@ def _most_numbers(config: TrainConfig) -> int:
 
 
 def _evaluations(archive: zipfile.ZipFile, config: TrainConfig) -> tuple[GreedyPoint, ...]:
-    if "evaluations.npy" not in archive.namelist():
+    numbers = _added(archive, "evaluations", np.float64, _most_numbers(config))
+    if numbers is None:
         return ()
-    numbers = _array(archive, "evaluations", np.float64, _most_numbers(config))
     return tuple(
         GreedyPoint(int(episodes), int(steps), *others)
         for episodes, steps, *others in numbers.reshape(-1, _POINT).tolist()
     )
+
+
+def _added(
+    archive: zipfile.ZipFile, name: str, kind: npt.DTypeLike, most: int
+) -> npt.NDArray[Any] | None:
+    """Return an array that some checkpoints lack."""
+    return _array(archive, name, kind, most) if f"{name}.npy" in archive.namelist() else None
+
+
+def check_visits(visits: npt.NDArray[np.int64], size: int, steps: int) -> None:
+    """Refuse visits that a training of so many steps cannot have made.
+
+    Raises:
+        ValueError: See above.
+    """
+    if visits.size != size or (visits < 0).any() or int(visits.sum()) != steps:
+        raise ValueError("visits that are not those of its episodes")
 
 
 def _array(archive: zipfile.ZipFile, name: str, kind: npt.DTypeLike, most: int) -> npt.NDArray[Any]:
@@ -252,12 +278,13 @@ def _check_snapshot(snapshot: Snapshot, period: int | None) -> None:
     Raises:
         ValueError: See above.
     """
-    totals, steps, endings = snapshot.columns
-    if not len(totals) == len(steps) == len(endings):
+    totals, steps, endings, sides = snapshot.columns
+    if len({len(column) for column in snapshot.columns}) > 1:
         raise ValueError("columns of episodes that do not fit together")
     if not (np.isfinite(totals).all() and (steps > 0).all()):
         raise ValueError("episodes without steps, or without a return")
-    if not np.isin(endings, range(len(ENDINGS))).all() or snapshot.seconds < 0:
+    known = np.isin(endings, range(len(ENDINGS))).all() and np.isin(sides, range(len(SIDES))).all()
+    if not known or snapshot.seconds < 0:
         raise ValueError("episodes that the training does not have")
     due = range(period, len(totals) + 1, period) if period else ()
     if [point.episodes for point in snapshot.evaluations] != list(due):

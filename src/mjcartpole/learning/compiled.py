@@ -155,18 +155,26 @@ class CompiledLoop:
             (start, stop, learner.episodes),
             self._chunk,
             log.storage,
+            learner.visits,
             self._scratch,
         )
 
-    def play(self, policy: Policy, env_rng: np.random.Generator, episodes: int) -> EpisodeLog:
+    def play(
+        self, policy: Policy, starts: np.random.Generator | npt.NDArray[np.float64], episodes: int
+    ) -> EpisodeLog:
         """Play greedy episodes, as `play_episode` does.
+
+        Args:
+            policy: Acts.
+            starts: Draws the starting states, or has them as rows.
+            episodes: How many.
 
         Raises:
             SimulationError: The physics diverged; names episode and step.
         """
         log = EpisodeLog(episodes)
         grid = _arrays(policy.discretizer.grid)
-        common = (self._physics, self._rules, grid, policy.tiles, policy.choices, env_rng)
+        common = (self._physics, self._rules, grid, policy.tiles, policy.choices, starts)
         while len(log) < episodes:
             number = _run(
                 kernels.play_chunk(self._task.reward),

@@ -1,13 +1,16 @@
 """What an episode came to, and the log of all episodes of a training."""
 
 from collections.abc import Iterator, Sequence
-from typing import Final, Literal, NamedTuple, Self, overload
+from typing import Any, Final, Literal, NamedTuple, Self, overload
 
 import numpy as np
 import numpy.typing as npt
 
 Ending = Literal["time limit", "off the track", "pole fell"]
 ENDINGS: Final[tuple[Ending, ...]] = ("time limit", "off the track", "pole fell")
+Side = Literal["", "left", "right"]
+SIDES: Final[tuple[Side, ...]] = ("", "left", "right")
+"""Where the rules ended an episode; the first at a time limit, and where it was not noted."""
 
 _TOUCHED: Final = 10_000_000
 """Episodes whose memory is claimed at the start, so that a long training does not grow."""
@@ -21,6 +24,8 @@ class Episode(NamedTuple):
     """Undiscounted return."""
     steps: int
     ending: Ending
+    side: Side = ""
+    """Where the cart left the track, or to which side the pole fell."""
 
 
 def ending_index(terminated: bool, x: float, x_limit: float) -> int:
@@ -36,13 +41,28 @@ def ending_index(terminated: bool, x: float, x_limit: float) -> int:
     return 1 if abs(x) > x_limit else 2
 
 
+def side_index(ending: int, x: float, theta: float) -> int:
+    """Return on which side an episode ended, as an index of `SIDES`.
+
+    Args:
+        ending: Why, as an index of `ENDINGS`.
+        x: The cart's last position, m.
+        theta: The last angle of the pole, of several that of the one that leans most, rad.
+    """
+    if ending == 0:
+        return 0
+    return 2 if (x if ending == 1 else theta) > 0.0 else 1
+
+
 class Columns(NamedTuple):
-    """Episodes in columns, each of shape (n,): thirteen bytes for an episode."""
+    """Episodes in columns, each of shape (n,): fourteen bytes for an episode."""
 
     totals: npt.NDArray[np.float64]
     steps: npt.NDArray[np.int32]
     endings: npt.NDArray[np.int8]
     """Indices of `ENDINGS`."""
+    sides: npt.NDArray[np.int8]
+    """Indices of `SIDES`."""
 
     def __repr__(self) -> str:
         return f"Columns({len(self.totals):,} episodes)"
@@ -65,6 +85,7 @@ class EpisodeLog(Sequence[Episode]):
             np.empty(capacity, np.float64),
             np.empty(capacity, np.int32),
             np.empty(capacity, np.int8),
+            np.empty(capacity, np.int8),
         )
         self._length = 0
         for column in self.storage:
@@ -85,26 +106,26 @@ class EpisodeLog(Sequence[Episode]):
     def csv(self, name: str = "episode") -> str:
         """One line per episode, numbered from 1, under a line of names; the first is given."""
         # There are few different ones, so each is put together once.
-        tails: dict[tuple[float, int, int], str] = {}
-        lines = [f"{name},return,steps,ending\n"]
+        tails: dict[tuple[float, int, int, int], str] = {}
+        lines = [f"{name},return,steps,ending,side\n"]
         columns = (column.tolist() for column in self.columns)
         for number, episode in enumerate(zip(*columns, strict=True), start=1):
             if episode not in tails:
-                total, steps, ending = episode
-                tails[episode] = f",{total},{steps},{ENDINGS[ending]}\n"
+                total, steps, ending, side = episode
+                tails[episode] = f",{total},{steps},{ENDINGS[ending]},{SIDES[side]}\n"
             lines.append(f"{number}{tails[episode]}")
         return "".join(lines)
 
     @property
     def columns(self) -> Columns:
         """The episodes so far, each column of shape (len(log),); views."""
-        totals, steps, endings = self.storage
-        n = self._length
-        return Columns(totals[:n], steps[:n], endings[:n])
+        columns: list[Any] = [column[: self._length] for column in self.storage]
+        return Columns(*columns)
 
     def append(self, episode: Episode) -> None:
         """Add the next episode."""
-        self._put(self._length, episode.total, episode.steps, ENDINGS.index(episode.ending))
+        kind, side = ENDINGS.index(episode.ending), SIDES.index(episode.side)
+        self._put(self._length, episode.total, episode.steps, kind, side)
         self._length += 1
 
     def extend_to(self, length: int) -> None:
@@ -133,16 +154,10 @@ class EpisodeLog(Sequence[Episode]):
         return (self._at(index) for index in range(self._length))
 
     def _at(self, index: int) -> Episode:
-        totals, steps, endings = self.storage
-        ending = ENDINGS[endings[index]]
-        return Episode(index, float(totals[index]), int(steps[index]), ending)
+        totals, steps, endings, sides = (column[index] for column in self.storage)
+        return Episode(index, float(totals), int(steps), ENDINGS[endings], SIDES[sides])
 
-    def _put(
-        self,
-        where: int | slice,
-        totals: npt.ArrayLike,
-        steps: npt.ArrayLike,
-        endings: npt.ArrayLike,
-    ) -> None:
-        storage = self.storage
-        storage.totals[where], storage.steps[where], storage.endings[where] = totals, steps, endings
+    def _put(self, where: int | slice, *columns: npt.ArrayLike) -> None:
+        storage: tuple[Any, ...] = self.storage
+        for column, values in zip(storage, columns, strict=True):
+            column[where] = values

@@ -31,20 +31,26 @@ from mjcartpole.learning.stepping import (
     Floats,
     Physics,
     Rules,
+    State,
     advance,
     begin,
     compiled,
     has_diverged,
     is_over,
+    lean,
     note,
     observe,
     pay,
+    start_at,
 )
 from mjcartpole.physics import cartpole_v1
 from mjcartpole.physics.simulation import LARGEST_SANE
 
 DIVERGED: Final = -1
 """In place of an ending."""
+
+Played: TypeAlias = tuple[float, int, int, int]
+"""Return, steps, ending and side of an episode."""
 
 Rngs: TypeAlias = tuple[np.random.Generator, np.random.Generator]
 """The environment's generator and the learner's."""
@@ -62,8 +68,17 @@ class Scratch(NamedTuple):
     """Number of the next episode, shape (1,): it is known even where Ctrl-C swallows a return."""
 
 
-_ending_index = compiled(episodes.ending_index)
+_ending_index, _side_index = compiled(episodes.ending_index), compiled(episodes.side_index)
 _row_of, _folded = compiled(discretizer.row_of), compiled(discretizer.folded)
+
+
+@compiled
+def _ended(
+    physics: Physics, rules: Rules, state: State, total: float, steps: int, terminated: bool
+) -> Played:
+    ending = _ending_index(terminated, state[0], rules.x_limit)
+    side = _side_index(ending, state[0], lean(physics, state)) if terminated else 0
+    return total, steps, ending, side
 
 
 @compiled
@@ -79,33 +94,38 @@ def _learn_episode(
     memory: Any,
     rates: Any,
     rngs: Rngs,
+    visits: npt.NDArray[np.int64],
     scratch: Scratch,
-) -> tuple[float, int, int]:
-    """Play an episode and learn; returns its return, steps and ending."""
+) -> Played:
+    """Play an episode and learn."""
     states, actions, rewards = scratch.states, scratch.actions, scratch.rewards
     state = begin(physics, rules, rngs[0])
-    s, mirrored = _folded(_row_of(observe(physics, rules, state), grid), grid.folding)
+    row = _row_of(observe(physics, rules, state), grid)
+    s, mirrored = _folded(row, grid.folding)
     states[0] = s
     total, steps, over, terminated = 0.0, 0, False, False
     while not over:
         a = act(p, memory, rates, s, rngs[1])
-        state = advance(physics, rules, state, 1 - a if mirrored else a)
+        pushed = 1 - a if mirrored else a
+        visits[2 * _home(p.tiles, row) + pushed] += 1
+        state = advance(physics, rules, state, pushed)
         terminated = is_over(rules, state)
         if terminated and has_diverged(state):
             note(physics, state, steps, scratch.failure)
-            return total, steps, DIVERGED
+            return total, steps, DIVERGED, 0
         r = pay(reward, rules, state, terminated)
         total += r
         actions[steps], rewards[steps] = a, r
         steps += 1
         over = terminated or steps == rules.time_limit
-        s_next, mirrored = _folded(_row_of(observe(physics, rules, state), grid), grid.folding)
+        row = _row_of(observe(physics, rules, state), grid)
+        s_next, mirrored = _folded(row, grid.folding)
         after_step(p, memory, rates, Transition(s, a, r, s_next, terminated, over), rngs[1])
         states[steps] = s_next
         s = s_next
     episode = Trajectory(states, actions, rewards, steps, terminated)
     after_episode(p, memory, rates, episode, rngs[1])
-    return total, steps, _ending_index(terminated, state[0], rules.x_limit)
+    return _ended(physics, rules, state, total, steps, terminated)
 
 
 @compiled
@@ -116,11 +136,10 @@ def _play_episode(
     grid: Grid,
     tiling: Any,
     choices: Any,
-    rng: np.random.Generator,
+    state: State,
     failure: Floats,
-) -> tuple[float, int, int]:
-    """Play an episode without learning; returns its return, steps and ending."""
-    state = begin(physics, rules, rng)
+) -> Played:
+    """Play an episode without learning, from a state in which the cart-pole is."""
     total, steps, over, terminated = 0.0, 0, False, False
     while not over:
         s = _row_of(observe(physics, rules, state), grid)
@@ -128,16 +147,17 @@ def _play_episode(
         terminated = is_over(rules, state)
         if terminated and has_diverged(state):
             note(physics, state, steps, failure)
-            return total, steps, DIVERGED
+            return total, steps, DIVERGED, 0
         total += pay(reward, rules, state, terminated)
         steps += 1
         over = terminated or steps == rules.time_limit
-    return total, steps, _ending_index(terminated, state[0], rules.x_limit)
+    return _ended(physics, rules, state, total, steps, terminated)
 
 
 @compiled
-def _log(columns: Columns, number: int, played: tuple[float, int, int]) -> None:
-    columns.totals[number], columns.steps[number], columns.endings[number] = played
+def _log(columns: Columns, number: int, played: Played) -> None:
+    columns.totals[number], columns.steps[number] = played[0], played[1]
+    columns.endings[number], columns.sides[number] = played[2], played[3]
 
 
 def _entry(function: F, sources: str) -> F:
@@ -176,6 +196,7 @@ def learn_chunk(method: Any, reward: task.Reward) -> Callable[..., int]:
         numbers: tuple[int, int, int],
         most_steps: int,
         columns: Columns,
+        visits: npt.NDArray[np.int64],
         scratch: Scratch,
     ) -> int:
         """Learn from episodes `numbers[0]` to `numbers[1] - 1` of `numbers[2]` in all.
@@ -201,6 +222,7 @@ def learn_chunk(method: Any, reward: task.Reward) -> Callable[..., int]:
                 memory,
                 rates,
                 rngs,
+                visits,
                 scratch,
             )
             _log(columns, number, played)
@@ -227,17 +249,22 @@ def play_chunk(reward: task.Reward) -> Callable[..., int]:
         grid: Grid,
         tiling: Any,
         choices: Any,
-        rng: np.random.Generator,
+        starts: Any,
         numbers: tuple[int, int],
         most_steps: int,
         columns: Columns,
         failure: Floats,
     ) -> int:
-        """Do the same as `learn_chunk` without learning; for the choices see `tiles.greedy`."""
+        """Do the same as `learn_chunk` without learning.
+
+        Where each episode starts is drawn by a generator, or is a row of an array; for the choices
+        see `tiles.greedy`.
+        """
         _ = sources
         all_steps = 0
         for number in range(numbers[0], numbers[1]):
-            played = _play_episode(reward, physics, rules, grid, tiling, choices, rng, failure)
+            state = start_at(physics, rules, starts, number)
+            played = _play_episode(reward, physics, rules, grid, tiling, choices, state, failure)
             _log(columns, number, played)
             all_steps += played[1]
             if played[2] == DIVERGED:
@@ -277,7 +304,7 @@ def _globals_of(function: FunctionType) -> list[Any]:
     return [function.__globals__[name] for name in names if name in function.__globals__]
 
 
-_greedy = compiled(_compilable(tiles.greedy))
+_greedy, _home = compiled(_compilable(tiles.greedy)), compiled(tiles.home)
 
 
 @functools.cache

@@ -1,5 +1,6 @@
 """A learner: a method at work, with its parameters, its memory and its generator."""
 
+import math
 from typing import Any, Final
 
 import gymnasium
@@ -14,6 +15,7 @@ from mjcartpole.learning.methods.experience import Dynamics
 from mjcartpole.learning.methods.limits import check_limits
 from mjcartpole.learning.methods.parameters import numbers_of
 from mjcartpole.learning.tiles import tiles_of
+from mjcartpole.task import N_ACTIONS
 
 STREAM: Final = 1
 """Spawn key of the learner's generator: its draws are independent of the env's."""
@@ -27,6 +29,8 @@ class Learner:
         p: Its parameters as numbers.
         memory: A NamedTuple of flat arrays, which are changed in place.
         rng: The learner's own generator.
+        visits: How often each action was taken in each state, flat, shape (bins times 2,); of
+            several tilings in that which is not moved, of nodes in the nearest (see `tiles.home`).
         episodes: How many episodes the whole training has: schedules need it.
     """
 
@@ -41,6 +45,7 @@ class Learner:
         self.p = numbers_of(config, self.method.Numbers, tiles_of(discretizer))
         self.rng = np.random.default_rng(np.random.SeedSequence(config.seed, spawn_key=(STREAM,)))
         self.memory = self.method.make_memory(self.p, discretizer.n_rows, self.rng)
+        self.visits = np.zeros(math.prod(discretizer.bins) * N_ACTIONS, np.int64)
         self.episodes = config.episodes
         self._discretizer = discretizer
 

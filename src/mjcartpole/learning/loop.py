@@ -1,6 +1,7 @@
 """Episodes as generators over any gymnasium environment: the reference loop."""
 
-from collections.abc import Callable, Iterator
+import math
+from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 import gymnasium
@@ -8,10 +9,11 @@ import numpy as np
 import numpy.typing as npt
 
 from mjcartpole.errors import SimulationError
-from mjcartpole.learning.discretizer import Discretizer
-from mjcartpole.learning.episodes import ENDINGS, Episode, ending_index
+from mjcartpole.learning.discretizer import Discretizer, folded, row_of
+from mjcartpole.learning.episodes import ENDINGS, SIDES, Episode, ending_index, side_index
 from mjcartpole.learning.methods.experience import Trajectory, Transition
-from mjcartpole.task import CARTPOLE_V1
+from mjcartpole.learning.tiles import home
+from mjcartpole.task import CARTPOLE_V1, most_leaning, wrapped
 
 if TYPE_CHECKING:
     from mjcartpole.learning.learner import Learner
@@ -52,15 +54,20 @@ def _learn_episode(
     method, p, rng, memory = learner.method, learner.p, learner.rng, learner.quick_memory()
     act, after_step, step = method.act, method.after_step, env.step
     rates = method.begin_episode(p, memory, number, learner.episodes)
-    s, mirrored = discretizer.folded(observation.tolist())
+    grid, tiles, visits = discretizer.grid, p.tiles, learner.visits.data
+    row = row_of(observation.tolist(), grid)
+    s, mirrored = folded(row, grid.folding)
     states, actions, rewards = [s], list[int](), list[float]()
     over = terminated = False
     try:
         while not over:
             a = act(p, memory, rates, s, rng)
-            observation, reward, terminated, truncated, _ = step(1 - a if mirrored else a)
+            pushed = 1 - a if mirrored else a
+            visits[2 * home(tiles, row) + pushed] += 1
+            observation, reward, terminated, truncated, _ = step(pushed)
             r, over = float(reward), terminated or truncated
-            s_next, mirrored = discretizer.folded(observation.tolist())
+            row = row_of(observation.tolist(), grid)
+            s_next, mirrored = folded(row, grid.folding)
             after_step(p, memory, rates, Transition(s, a, r, s_next, terminated, over), rng)
             states.append(s_next)
             actions.append(a)
@@ -90,6 +97,7 @@ def play_episode(
     *,
     number: int = 0,
     seed: int | None = None,
+    start: Sequence[float] | None = None,
 ) -> tuple[Episode, list[State]]:
     """Play one episode without learning.
 
@@ -98,11 +106,18 @@ def play_episode(
         policy: From an observation, float32 of shape (4,), to an action.
         number: Number of the episode, for the record.
         seed: Seeds the environment if given.
+        start: Begins in this state instead of one that is drawn.
 
     Returns:
         The episode, and its states from the first to the last, each float64 of shape (4,).
     """
     observation, _ = env.reset(seed=seed)
+    if start is not None:
+        env.unwrapped.state = np.array(start)  # type: ignore[attr-defined]
+        seen = _state_of(env)
+        if math.isinf(getattr(env.unwrapped, "theta_threshold_radians", 0.0)):
+            seen[2::2] = wrapped(seen[2::2])
+        observation = seen.astype(np.float32)
     states = [_state_of(env)]
     total, over, terminated = 0.0, False, False
     try:
@@ -120,8 +135,10 @@ def _ended(
     env: gymnasium.Env[Any, Any], number: int, total: float, steps: int, terminated: bool
 ) -> Episode:
     x_limit = getattr(env.unwrapped, "x_threshold", CARTPOLE_V1.x_limit)
-    ending = ENDINGS[ending_index(terminated, _state_of(env)[0], x_limit)]
-    return Episode(number, total, steps, ending)
+    state = _state_of(env)
+    ending = ending_index(terminated, state[0], x_limit)
+    side = side_index(ending, state[0], most_leaning(state[2::2].tolist()))
+    return Episode(number, total, steps, ENDINGS[ending], SIDES[side])
 
 
 def _state_of(env: gymnasium.Env[Any, Any]) -> State:

@@ -1,6 +1,8 @@
 """What a training has come to so far, episode by episode, read back from its run folder."""
 
 import io
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -12,10 +14,12 @@ from mjcartpole.errors import RunError
 from mjcartpole.files import brief, is_folder, read_bytes
 from mjcartpole.learning.checkpoints import LATEST, load_checkpoint
 from mjcartpole.learning.config import TrainConfig
+from mjcartpole.learning.discretizer import Discretizer
 from mjcartpole.learning.documents import read_config
-from mjcartpole.learning.episodes import ENDINGS, Columns, EpisodeLog
+from mjcartpole.learning.episodes import ENDINGS, SIDES, Columns, EpisodeLog
 from mjcartpole.learning.run_model import read_document, stored_model
-from mjcartpole.learning.runs import EPISODES, EVALUATIONS, content_of
+from mjcartpole.learning.runs import EPISODES, EVALUATIONS, VISITS, content_of
+from mjcartpole.task import N_ACTIONS
 
 MOST_BYTES: Final = 2**28
 """Of a table of a run: some eight million episodes."""
@@ -73,44 +77,79 @@ def _of_checkpoint(
 
 
 def _read_episodes(path: Path, config: TrainConfig) -> Columns:
-    kinds = [("episode", "i8"), ("return", "f8"), ("steps", "i4"), ("ending", "U16")]
-    table = _read_table(path, kinds)
-    endings = np.full(len(table), -1, np.int8)
-    for number, ending in enumerate(ENDINGS):
-        endings[table["ending"] == ending] = number
+    before = {"episode": "i8", "return": "f8", "steps": "i4", "ending": "U16"}
+    table = _read_table(path, before | {"side": "U16"}, before)
+    endings = _indices(table["ending"], ENDINGS)
+    sided = "side" in (table.dtype.names or ())
+    sides = _indices(table["side"], SIDES) if sided else np.zeros(len(table), np.int8)
     right = (
         len(table) <= config.episodes
         and np.isfinite(table["return"]).all()
         and (table["steps"] > 0).all()
         and (endings >= 0).all()
+        and (sides >= 0).all()
     )
     if not right:
         raise RunError(f"'{path}' is damaged: it has episodes that the run cannot have had")
-    return Columns(table["return"], table["steps"], endings)
+    return Columns(table["return"], table["steps"], endings, sides)
+
+
+def _indices(words: npt.NDArray[Any], known: Sequence[str]) -> npt.NDArray[np.int8]:
+    """Return the index of each word; -1 of one that is unknown."""
+    found = np.full(len(words), -1, np.int8)
+    for index, word in enumerate(known):
+        found[words == word] = index
+    return found
+
+
+def read_visits(folder: Path, grid: Discretizer) -> npt.NDArray[np.int64] | None:
+    """Return how often each action was taken in each state; None where it was not counted.
+
+    Args:
+        folder: A run folder.
+        grid: Of its policy.
+
+    Raises:
+        RunError: They are damaged, or those of another table.
+    """
+    if VISITS not in content_of(folder):
+        return None
+    table = _read_table(folder / VISITS, {"left": "i8", "right": "i8"})
+    visits = np.stack([table["left"], table["right"]], axis=1)
+    if len(visits) != math.prod(grid.bins) or (visits < 0).any():
+        raise RunError(f"'{folder / VISITS}' is damaged: it is not of the run's table")
+    counted: npt.NDArray[np.int64] = visits.reshape(*grid.bins, N_ACTIONS)
+    return counted
 
 
 def _read_greedy(path: Path) -> tuple[tuple[int, float], ...]:
     names = ("episode", "steps", "mean", "minimum")
-    table = _read_table(path, [(name, "f8") for name in names])
+    table = _read_table(path, dict.fromkeys(names, "f8"))
     if not all(np.isfinite(table[name]).all() for name in names):
         raise RunError(f"'{path}' is damaged: it has values that are not finite")
     pairs = zip(table["episode"].tolist(), table["mean"].tolist(), strict=True)
     return tuple((int(episode), mean) for episode, mean in pairs)
 
 
-def _read_table(path: Path, kinds: list[tuple[str, str]]) -> npt.NDArray[Any]:
+def _read_table(path: Path, *kinds: dict[str, str]) -> npt.NDArray[Any]:
     """Return the lines of a table under a line of names.
+
+    Args:
+        path: The file.
+        kinds: The columns that it may have, by name.
 
     Raises:
         RunError: It cannot be read, or has other columns.
     """
     head, _, lines = read_bytes(path, MOST_BYTES, refusal=RunError).partition(b"\n")
-    names = ",".join(name for name, _ in kinds)
-    if head.rstrip() != names.encode():
+    known = {",".join(columns).encode(): list(columns.items()) for columns in kinds}
+    columns = known.get(head.rstrip())
+    if columns is None:
+        names = next(iter(known)).decode()
         raise RunError(f"'{path}' is damaged: its first line is not {names}")
+    if not lines.strip():
+        return np.empty(0, columns)
     try:
-        if not lines.strip():
-            return np.empty(0, kinds)
-        return np.loadtxt(io.BytesIO(lines), kinds, delimiter=",", comments=None, ndmin=1)
-    except ValueError as error:
+        return np.loadtxt(io.BytesIO(lines), columns, delimiter=",", comments=None, ndmin=1)
+    except (ValueError, OverflowError) as error:
         raise RunError(f"'{path}' is damaged: {brief(error)}") from error

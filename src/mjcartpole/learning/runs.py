@@ -9,6 +9,8 @@ checkpoint.bin  while it lasts: its state (see checkpoints.py)
 episodes.csv    one line per training episode
 evaluations.csv where they were asked for: one line per greedy evaluation in between
 policy.json     the greedy policy (see policy.py)
+visits.csv      how often each action was taken in each state
+curve.png       the learning curve, where matplotlib is installed
 timing.json     how long it took: the one file that differs between equal runs
 summary.json    what came out
 """
@@ -51,6 +53,8 @@ BEGINNING: Final = (VERSIONS, MODEL, CONFIG)
 RESULTS: Final = (EPISODES, POLICY, TIMING, SUMMARY)
 FILES: Final = (*BEGINNING, *RESULTS)
 EVALUATIONS: Final = "evaluations.csv"
+VISITS: Final = "visits.csv"
+CURVE: Final = "curve.png"
 EVENTS: Final = "events.out.tfevents.*"
 """TensorBoard's (see tensorboard.py)."""
 
@@ -169,6 +173,9 @@ def write_results(folder: Path, result: TrainResult, summary: dict[str, Any]) ->
     """
     write_whole(folder / EPISODES, result.episodes.csv(result.config.episode.replace(" ", "_")))
     result.policy.save(folder / POLICY)
+    if result.visits is not None:
+        lines = [f"{left},{right}\n" for left, right in result.visits.reshape(-1, 2).tolist()]
+        write_whole(folder / VISITS, "".join(["left,right\n", *lines]))
     timing = {"training_seconds": round(result.seconds, 3), "steps": result.steps}
     if result.solved is not None:
         timing["seconds_to_solve"] = round(result.solved.seconds, 3)
@@ -354,7 +361,7 @@ def _own(content: set[str]) -> list[str]:
     """Names of a run's files, those of `content` among them, in the order of their removal."""
     # The config first: without it a folder holds no run, so that two are never mixed.
     events = fnmatch.filter(content, EVENTS)
-    return [CONFIG, MODEL, *events, EVALUATIONS, *RESULTS, LATEST, FORMER, VERSIONS]
+    return [CONFIG, MODEL, *events, CURVE, VISITS, EVALUATIONS, *RESULTS, LATEST, FORMER, VERSIONS]
 
 
 def _remove_files(folder: Path, keep: Iterable[str] = ()) -> None:

@@ -188,6 +188,40 @@ def begin(physics: AnyPhysics, rules: Rules, rng: np.random.Generator) -> State:
     raise NotImplementedError  # Numba takes one of those above; so below.
 
 
+def _put_mujoco(physics: AnyPhysics, rules: Rules, start: Floats) -> State:
+    _mj_reset(physics.model, physics.data)
+    joints, qpos, qvel = _ints(physics.joints), _floats(physics.qpos), _floats(physics.qvel)
+    for index in range(physics.n_joints):
+        qpos[joints[index]], qvel[joints[index]] = start[2 * index], start[2 * index + 1]
+    return _as_one_pole(physics, rules)
+
+
+def _put_gym(physics: AnyPhysics, rules: Rules, start: Floats) -> State:
+    return start[0], start[1], start[2], start[3]
+
+
+@_for_each(_put_mujoco, _put_gym)
+def put(physics: AnyPhysics, rules: Rules, start: Floats) -> State:
+    """Return a starting state in which the cart-pole is put; nothing of its past remains."""
+    raise NotImplementedError
+
+
+def start_at(physics: AnyPhysics, rules: Rules, starts: Any, number: int) -> State:
+    """Return the starting state of an episode: drawn by a generator, or a row of an array."""
+    raise NotImplementedError
+
+
+@overload(start_at, strict=False)
+def _choose_start(physics: AnyPhysics, rules: Any, starts: Any, number: Any) -> Any:
+    def drawn(physics: AnyPhysics, rules: Rules, starts: Any, number: int) -> State:
+        return begin(physics, rules, starts)
+
+    def given(physics: AnyPhysics, rules: Rules, starts: Any, number: int) -> State:
+        return put(physics, rules, starts[number])
+
+    return given if isinstance(starts, types.Array) else drawn
+
+
 # --- move it ------------------------------------------------------------------------------------
 
 
@@ -300,6 +334,25 @@ def has_diverged(state: State) -> bool:
     for value in state:
         sane &= -LARGEST_SANE < value < LARGEST_SANE
     return not sane
+
+
+def _lean_mujoco(physics: AnyPhysics, state: State) -> float:
+    joints, qpos = _ints(physics.joints), _floats(physics.qpos)
+    angle: float = qpos[joints[1]]
+    for index in range(2, physics.n_joints):
+        if abs(qpos[joints[index]]) > abs(angle):
+            angle = qpos[joints[index]]
+    return angle
+
+
+def _lean_gym(physics: AnyPhysics, state: State) -> float:
+    return state[2]
+
+
+@_for_each(_lean_mujoco, _lean_gym)
+def lean(physics: AnyPhysics, state: State) -> float:
+    """Return the angle of the pole that leans most, with its sign; see `most_leaning`."""
+    raise NotImplementedError
 
 
 def _note_mujoco(physics: AnyPhysics, state: State, steps: int, failure: Floats) -> None:

@@ -26,7 +26,7 @@ from mjcartpole.learning.loop import learn_episodes
 from mjcartpole.learning.policy import Policy
 from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.symmetry import check_symmetric
-from mjcartpole.task import CONTROL_STEP
+from mjcartpole.task import CONTROL_STEP, N_ACTIONS
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -41,6 +41,9 @@ class TrainResult:
         evaluations: The greedy evaluations in its midst, where the config asks for them.
         seen: How many episodes and steps of the world a model was fitted to, in which all episodes
             above were played; None where they were played in the world itself.
+        visits: How often each action was taken in each state, shape (*bins, 2): of several tilings
+            in that which is not moved, of nodes in the nearest. None where it went on from a
+            checkpoint of a version that did not count.
     """
 
     config: TrainConfig
@@ -49,6 +52,7 @@ class TrainResult:
     seconds: float
     evaluations: tuple[GreedyPoint, ...] = ()
     seen: tuple[int, int] | None = None
+    visits: npt.NDArray[np.int64] | None = None
 
     @property
     def q_table(self) -> npt.NDArray[np.float64]:
@@ -85,6 +89,7 @@ class Snapshot:
         columns: The episodes so far, see `EpisodeLog`.
         seconds: Time they took.
         evaluations: The greedy evaluations so far.
+        visits: See `TrainResult`; flat.
     """
 
     memory: dict[str, npt.NDArray[Any]] = field(repr=False)
@@ -93,6 +98,7 @@ class Snapshot:
     columns: Columns = field(repr=False)
     seconds: float
     evaluations: tuple[GreedyPoint, ...] = field(default=(), repr=False)
+    visits: npt.NDArray[np.int64] | None = field(default=None, repr=False)
 
 
 class Training:
@@ -148,6 +154,7 @@ class Training:
             )
         self.log = EpisodeLog(config.episodes)
         self.evaluations: tuple[GreedyPoint, ...] = ()
+        self._all_counted = True
         self._cartpole = cartpole
         self._env_rng, _ = seeding.np_random(config.seed)
         self._seconds = 0.0
@@ -255,6 +262,7 @@ class Training:
 
     def result(self) -> TrainResult:
         """What has been learned so far; later episodes do not change it."""
+        visits = self._visits()
         return TrainResult(
             config=self.config,
             policy=self._policy(),
@@ -262,6 +270,7 @@ class Training:
             seconds=self._seconds,
             evaluations=self.evaluations,
             seen=self.learner.seen,
+            visits=None if visits is None else visits.reshape(*self.discretizer.bins, N_ACTIONS),
         )
 
     def _policy(self) -> Policy:
@@ -276,7 +285,11 @@ class Training:
             columns=self.log.copy().columns,
             seconds=self._seconds,
             evaluations=self.evaluations,
+            visits=self._visits(),
         )
+
+    def _visits(self) -> npt.NDArray[np.int64] | None:
+        return self.learner.visits.copy() if self._all_counted else None
 
     def restore(self, snapshot: Snapshot) -> None:
         """Go on from a snapshot of a training with the same config."""
@@ -287,6 +300,9 @@ class Training:
         self.log = EpisodeLog.of(snapshot.columns, self.config.episodes)
         self._seconds = snapshot.seconds
         self.evaluations = snapshot.evaluations
+        self._all_counted = snapshot.visits is not None
+        if snapshot.visits is not None:
+            self.learner.visits[:] = snapshot.visits
 
 
 def train(config: TrainConfig | None = None, *, engine: Engine = "compiled") -> TrainResult:

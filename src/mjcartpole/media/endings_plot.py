@@ -2,19 +2,17 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from mjcartpole.media.palette import CURVES, INK, MISSING
+from mjcartpole.media.palette import CURVES, INK
 from mjcartpole.media.plots import css, plot_style, short
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-MOST_ROWS: Final = 40
 
 Floats = npt.NDArray[np.float64]
 
@@ -27,13 +25,13 @@ class Endings:
         name: What a person calls it.
         episodes: The last episode of each stretch of the training, shape (k,).
         shares: Of each ending in each stretch, shape (endings, k).
-        greedy: Of each ending of the greedy policy, shape (endings,); None: it was not played.
+        greedy: Of each ending of the greedy policy, shape (endings,).
     """
 
     name: str
     episodes: npt.NDArray[np.int64]
     shares: Floats
-    greedy: Floats | None = None
+    greedy: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,21 +40,22 @@ class EndingsPlot:
 
     Attributes:
         runs: Each.
-        names: What the endings are called, in the order of their shares.
+        looks: Number and name of each ending, in the order of their shares; the number says how
+            it looks: the same in every plot.
     """
 
     runs: Sequence[Endings]
-    names: Sequence[str]
+    looks: Sequence[tuple[int, str]]
 
     def rows(self) -> Iterator[Mapping[str, object]]:
         """Yield a row for each stretch of each training, and one for each greedy policy."""
+        names = [name for _, name in self.looks]
         for run in self.runs:
             for episode, shares in zip(run.episodes.tolist(), run.shares.T.tolist(), strict=True):
-                named = dict(zip(self.names, shares, strict=True))
+                named = dict(zip(names, shares, strict=True))
                 yield {"run": run.name, "what": "training", "episode": episode, **named}
-            if run.greedy is not None:
-                named = dict(zip(self.names, run.greedy.tolist(), strict=True))
-                yield {"run": run.name, "what": "greedy", **named}
+            named = dict(zip(names, run.greedy.tolist(), strict=True))
+            yield {"run": run.name, "what": "greedy", **named}
 
     @plot_style()
     def figure(self) -> "Figure":
@@ -75,22 +74,18 @@ class EndingsPlot:
             self._draw_greedy(right, run)
         axes[-1, 0].set_xlabel("episode")
         figure.legend(
-            axes[0, 0].collections[::-1], list(self.names)[::-1], loc="outside right upper"
+            axes[0, 0].collections[::-1],
+            [name for _, name in self.looks[::-1]],
+            loc="outside right upper",
         )
         return figure
 
     def _draw_training(self, axes: "Axes", run: Endings) -> None:
         edges = np.concatenate([[0], run.episodes])
         tops = np.cumsum(run.shares, axis=0)
-        bottoms = tops - run.shares
-        for number, (low, high) in enumerate(zip(bottoms, tops, strict=True)):
-            axes.fill_between(
-                edges,
-                np.append(low, low[-1]),
-                np.append(high, high[-1]),
-                step="post",
-                **_look(number),
-            )
+        for (number, _), top, share in zip(self.looks, tops, run.shares, strict=True):
+            ends = np.append(top - share, (top - share)[-1]), np.append(top, top[-1])
+            axes.fill_between(edges, *ends, step="post", **_look(number))
         axes.set_title(short(run.name, 60), fontsize="medium")
         axes.set(xlim=(0, edges[-1]), ylim=(0, 1))
         axes.xaxis.set_major_formatter("{x:,.0f}")
@@ -101,17 +96,20 @@ class EndingsPlot:
         axes.set_title("greedy", fontsize="medium")
         axes.set_xticks([])
         axes.grid(visible=False)
-        if run.greedy is None:
-            axes.set_facecolor(css(MISSING))
-            return
-        for number, (top, share) in enumerate(zip(np.cumsum(run.greedy), run.greedy, strict=True)):
+        tops = np.cumsum(run.greedy)
+        for (number, _), top, share in zip(self.looks, tops, run.greedy, strict=True):
             axes.bar(0, share, 1, top - share, **_look(number))
 
 
 def _look(number: int) -> dict[str, Any]:
-    """Return colours and, for print without them, hatches of an ending."""
-    colour = (CURVES[4], CURVES[1], CURVES[5], CURVES[0], CURVES[2])[number % 5]
-    hatch = ("///", "\\\\\\", "...", "xxx", "")[number % 5]
+    """Return how an ending looks: a fall, a cart off the track, a time limit have a colour each.
+
+    Sides are told apart by the direction of their hatches; without colours that is enough.
+    """
+    colour = (CURVES[4], CURVES[1], CURVES[5])[number // 3]
+    hatch = (("", "\\\\\\", "///"), ("..", "\\\\\\...", "///..."), ("", "", ""))[number // 3][
+        number % 3
+    ]
     return {"facecolor": css(colour), "edgecolor": css(INK), "hatch": hatch, "linewidth": 0.3}
 
 

@@ -1,26 +1,27 @@
 """From which starts does a policy last? Greedy episodes from a grid of starting states, at once."""
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Final
+import contextlib
+from collections.abc import Mapping, Sequence
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 
+from mjcartpole.envs.backend import make_env
 from mjcartpole.errors import ConfigError
-from mjcartpole.learning.many_states import actions_in
+from mjcartpole.learning.engine import Engine, choose_engine
+from mjcartpole.learning.loop import play_episode
 from mjcartpole.learning.slices import Axes, choose_axes, names_of, states_over
 from mjcartpole.media.grid_plot import Field, Grid
-from mjcartpole.physics.batch_simulation import BatchSimulation
-from mjcartpole.physics.cartpole_v1 import FORCE, cartpole_v1_step
 from mjcartpole.studies.policy_setup import PolicySetup
 from mjcartpole.task import Task
 
 POINTS: Final = 61
 """Starts along each dimension."""
 MOST_POINTS: Final = 1_000
+"""A million episodes."""
 
 Floats = npt.NDArray[np.float64]
-Step = Callable[[Floats, npt.NDArray[np.int64]], Floats]
 
 
 def basin(
@@ -75,57 +76,29 @@ def limit_along(dimension: int, task: Task) -> float | None:
     return limit if dimension % 2 == 0 and np.isfinite(limit) else None
 
 
-def survival(setup: PolicySetup, starts: Floats) -> npt.NDArray[np.int64]:
+def survival(
+    setup: PolicySetup, starts: Floats, engine: Engine = "compiled"
+) -> npt.NDArray[np.int64]:
     """Return after how many steps greedy episodes end, shape (n,); at most the time limit.
 
     Args:
         setup: The policy and where it is played.
         starts: Starting states, shape (n, 2 + 2 poles).
+        engine: Who runs the loop; where the compiled one cannot run, the other does.
 
     Raises:
-        SimulationError: The physics diverged.
+        SimulationError: The physics diverged; names episode and step.
     """
-    grid, table, task = setup.table.discretizer, setup.table.q_table, setup.task
-    step = _mover(setup, starts)
-    states, lasting = starts, np.ones(len(starts), np.bool_)
-    steps = np.zeros(len(starts), np.int64)
-    for _ in range(task.time_limit):
-        states = step(states, actions_in(grid, table, states))
-        steps += lasting
-        lasting &= ~_is_over(states, task)
-        if not lasting.any():
-            break
-    return steps
+    cartpole = setup.cartpole if setup.backend == "mujoco" else None
+    physics = (setup.backend, setup.model, setup.integrator, setup.task)
+    if choose_engine(engine, setup.backend, cartpole, setup.task) == "compiled":
+        from mjcartpole.learning.compiled import CompiledLoop  # noqa: PLC0415 - it is heavy
 
-
-def _is_over(states: Floats, task: Task) -> npt.NDArray[np.bool_]:
-    over: npt.NDArray[np.bool_] = np.abs(states[:, 0]) > task.x_limit
-    return over | (np.abs(states[:, 2::2]) > task.theta_limit).any(axis=1)
-
-
-def _mover(setup: PolicySetup, starts: Floats) -> Step:
-    """Return what moves all states one step on; who has ended is put at rest, and moves on."""
-    task = setup.task
-
-    def at_rest(states: Floats) -> Floats:
-        return np.where(_is_over(states, task)[:, None], 0.0, states)
-
-    if setup.backend == "gym":
-        moved: Any = cartpole_v1_step  # of floats, and as well of arrays
-
-        def step(states: Floats, actions: npt.NDArray[np.int64]) -> Floats:
-            return np.array(moved(*at_rest(states).T, np.where(actions == 1, FORCE, -FORCE))).T
-
-        return step
-    batch = BatchSimulation(setup.cartpole, len(starts), setup.integrator)
-    batch.set_state(slice(None), starts)
-    controls = np.array(setup.cartpole.controls)
-
-    def batch_step(states: Floats, actions: npt.NDArray[np.int64]) -> Floats:
-        if (ended := np.flatnonzero(_is_over(states, task))).size:
-            batch.set_state(ended, np.zeros((ended.size, states.shape[1])))
-        batch.step(controls[actions])
-        batch.sizes()
-        return batch.state.copy()
-
-    return batch_step
+        log = CompiledLoop(*physics).play(setup.table, starts, len(starts))
+        return log.columns.steps.astype(np.int64)
+    with contextlib.closing(make_env(*physics)) as env:
+        played = [
+            play_episode(env, setup.table, number=number, start=start)[0].steps
+            for number, start in enumerate(starts.tolist())
+        ]
+    return np.array(played, np.int64)

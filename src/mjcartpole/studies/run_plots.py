@@ -9,10 +9,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 import numpy as np
+import numpy.typing as npt
 
 from mjcartpole.errors import ConfigError, check_known
-from mjcartpole.learning.episodes import ENDINGS
+from mjcartpole.learning.episodes import ENDINGS, SIDES
 from mjcartpole.learning.evaluation import EPISODES, evaluate
+from mjcartpole.learning.records import Record
 from mjcartpole.learning.slices import SHOWN, choose_axes, names_of, slices
 from mjcartpole.media.curve_plot import Curves
 from mjcartpole.media.endings_plot import Endings, EndingsPlot, stretches
@@ -22,7 +24,7 @@ from mjcartpole.media.plots import Plot
 from mjcartpole.studies.basin import basin, limit_along
 from mjcartpole.studies.film import play
 from mjcartpole.studies.policy_setup import PolicySetup, find_setup
-from mjcartpole.studies.run_curves import Group, curves_of, read_groups
+from mjcartpole.studies.run_curves import curves_of, read_groups
 from mjcartpole.studies.statistics import Average
 
 if TYPE_CHECKING:
@@ -34,6 +36,7 @@ STRETCHES: Final = 50
 """Of a training whose endings are counted."""
 
 At = Mapping[str, float]
+Floats = npt.NDArray[np.float64]
 Kinds = Literal["curve", "table", "basin", "phase", "endings"]
 
 
@@ -158,20 +161,26 @@ def endings(folders: Iterable[Path], *, episodes: int = EPISODES) -> EndingsPlot
         RunError: A run is damaged, or no episode of it is finished.
         SimulationError: The physics diverged.
     """
-    groups = read_groups(folders)
-    return EndingsPlot([_endings(group, episodes) for group in groups], ENDINGS[::-1])
+    counted = [(name, *_count(records, episodes)) for name, records in read_groups(folders)]
+    found = sum(counts.sum(axis=1) + greedy for _, _, counts, greedy in counted) > 0
+    runs = [
+        Endings(name, ends, (counts / counts.sum(axis=0))[found], (greedy / greedy.sum())[found])
+        for name, ends, counts, greedy in counted
+    ]
+    looks = [(number, name) for number, name in enumerate(_NAMES) if found[number]]
+    return EndingsPlot(runs, looks)
 
 
-def _endings(group: Group, episodes: int) -> Endings:
-    name, records = group
-    n = max(len(record.columns.totals) for record in records)
-    ends = stretches(n, STRETCHES)
-    counts = np.zeros((len(ENDINGS), len(ends)))
+def _count(
+    records: Sequence[Record], episodes: int
+) -> tuple[npt.NDArray[np.int64], Floats, Floats]:
+    """Return stretches of trainings, how often each ending came in each, and in greedy episodes."""
+    ends = stretches(max(len(record.columns.totals) for record in records), STRETCHES)
+    counts, greedy = np.zeros((len(_NAMES), len(ends))), np.zeros(len(_NAMES))
     for record in records:
-        stretch = np.searchsorted(ends, np.arange(1, len(record.columns.totals) + 1))
-        np.add.at(counts, (len(ENDINGS) - 1 - record.columns.endings, stretch), 1)
-    greedy = np.zeros(len(ENDINGS))
-    for record in records:
+        kinds = record.columns.endings * len(SIDES) + record.columns.sides
+        stretch = np.searchsorted(ends, np.arange(1, len(kinds) + 1))
+        np.add.at(counts, (_PLACES[kinds], stretch), 1)
         setup = find_setup(record.folder)
         played = evaluate(
             setup.table,
@@ -182,8 +191,18 @@ def _endings(group: Group, episodes: int) -> Endings:
             episodes=episodes,
             seed=setup.seed,
         )
-        greedy += list(played.endings.values())[::-1]
-    return Endings(name, ends, counts / counts.sum(axis=0), greedy / greedy.sum())
+        for episode in played.episodes:
+            kind = ENDINGS.index(episode.ending) * len(SIDES) + SIDES.index(episode.side)
+            greedy[_PLACES[kind]] += 1
+    return ends, counts, greedy
+
+
+_KINDS: Final = [
+    (ending, side) for ending in ("pole fell", "off the track", "time limit") for side in SIDES
+]
+_NAMES: Final = [f"{ending} {side}".rstrip() for ending, side in _KINDS]
+_PLACES: Final = np.array([_KINDS.index((e, side)) for e in ENDINGS for side in SIDES])
+"""From an ending and a side, as the log numbers them, to what is drawn from below upwards."""
 
 
 OF_SEVERAL: Final[Mapping[str, Callable[..., Plot]]] = {"curve": curve, "endings": endings}
