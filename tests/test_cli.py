@@ -126,7 +126,9 @@ def test_a_file_whose_name_begins_with_a_dash_is_a_file(run, here, capsys):
 
 
 def test_training_films_its_first_evaluation_episode(here, capsys):
-    code, out, _ = call(["train", "--episodes", "4", "--run-dir", "runs/film"], capsys)
+    code, out, _ = call(
+        ["train", "--episodes", "4", "--no-curve", "--run-dir", "runs/film"], capsys
+    )
     assert code == 0
     assert "video  videos/film.mp4" in out
     summary = json.loads((here / "runs/film/summary.json").read_text())
@@ -164,7 +166,7 @@ def test_ctrl_c_ends_at_once_and_keeps_what_was_learned(here, capsys):
 def test_a_model_that_diverges_is_one_line_as_well(here):
     text = load_model().xml.replace('mass="1.0"', 'mass="1e-12"')
     (here / "wild.xml").write_text(text.replace('gear="10"', 'gear="1e12"'))
-    process = start(["train", "--model", "wild.xml", "--no-video"], here)
+    process = start(["train", "--model", "wild.xml", "--no-video", "--no-curve"], here)
     _, err = process.communicate(timeout=60)
     assert process.returncode == 2
     warning, said = err.splitlines()
@@ -237,7 +239,7 @@ def test_a_run_at_the_files_own_timestep_is_evaluated_as_it_was_trained(here, ca
 
 
 def test_it_is_said_where_no_policy_can_balance_a_model(here, capsys):
-    train = ["train", "--engine", "python", "--episodes", "3", "--no-video"]
+    train = ["train", "--engine", "python", "--episodes", "3", "--no-video", "--no-curve"]
     words = "no policy can balance this: from 8 of 8 starts every sequence of actions ends"
     for edits, expected in ((["--set", "force=1000"], 1), ([], 0)):
         code, out, _ = call(["model", "show", "cartpole", *edits], capsys)

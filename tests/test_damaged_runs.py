@@ -23,7 +23,7 @@ from nightly import few
 LIMIT = 20.0
 """Seconds that nothing may take."""
 
-EPISODES = ["--episodes", "6"]
+EPISODES = ["--episodes", "6", "--no-curve"]
 
 
 def interrupted(folder, config):
@@ -71,7 +71,10 @@ def call_forked(arguments):
 def good(tmp_path_factory):
     """Runs of every kind."""
     folder = tmp_path_factory.mktemp("good")
-    commands = {"one": ["--no-video"], "gym": ["--backend", "gym", "--no-video"]}
+    commands = {
+        "one": ["--no-video"],
+        "gym": ["--backend", "gym", "--no-video"],
+    }
     for name, more in {**commands, "many": ["--seeds", "2"]}.items():
         with pytest.raises(SystemExit) as stop:
             cli.main(["train", *EPISODES, *more, "--run-dir", str(folder / name)])

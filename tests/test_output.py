@@ -12,7 +12,7 @@ from mjcartpole import output
 from mjcartpole.physics.load import load_model
 from nightly import at_night, few
 
-TRAIN = "train --episodes 20 --no-video --run-dir run"
+TRAIN = "train --episodes 20 --no-video --no-curve --run-dir run"
 FULL = "error: stdout could not be written (No space left on device)"
 on_unix = pytest.mark.skipif(os.name == "nt", reason="needs a POSIX shell")
 needs_full = pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs /dev/full")
@@ -131,7 +131,7 @@ def test_names_that_no_encoding_has_do_not_matter(encoding, tmp_path):
     for command in (
         f"model edit cartpole --set pole.length=1 -o '{copy}'",
         f"model show '{copy}'",
-        f"train --episodes 5 --no-video --model '{copy}' --run-dir '{name}/run'",
+        f"train --episodes 5 --no-video --no-curve --model '{copy}' --run-dir '{name}/run'",
         f"render '{name}/run' --size 64x48 -o '{name}/film.gif'",
         f"transfer '{name}/run' --models '{copy}' --episodes 1 --workers 1 -o '{name}'",
     ):

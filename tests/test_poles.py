@@ -294,7 +294,7 @@ def call(argv):
 
 def test_a_run_is_stored_continued_evaluated_and_filmed(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    flags = ["--model", CHAIN, "--episodes", "30", "--no-video"]
+    flags = ["--model", CHAIN, "--episodes", "30", "--no-video", "--no-curve"]
     assert call(["train", *flags, "--run-dir", "whole"]) == 0
     first = Path("whole")
     assert runs.load_run(first).policy.poles == 2

@@ -172,7 +172,7 @@ def test_the_command_line_trains_films_and_evaluates_it(backend, tmp_path, monke
 def test_a_run_remembers_how_long_its_episodes_were(backend, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     words = ["train", "--backend", backend, "--episodes", "150", "--max-episode-steps", "30"]
-    assert run(*words, "--no-video", "--run-dir", "run") == 0
+    assert run(*words, "--no-video", "--no-curve", "--run-dir", "run") == 0
     config = read_config(tmp_path / "run")[2]
     assert train(config).returns.max() == 30
     capsys.readouterr()

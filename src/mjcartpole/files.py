@@ -1,11 +1,13 @@
 """Files that are written whole or not at all, and read as if somebody else had put them there."""
 
 import contextlib
+import csv
 import functools
+import io
 import os
 import re
 import stat
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from io import BufferedReader
 from pathlib import Path
 from typing import Final
@@ -48,6 +50,16 @@ def write_whole(path: str | os.PathLike[str], text: str) -> None:
     with atomic_write(path) as temporary:
         # A file name in it that is no text is escaped, as JSON does it.
         temporary.write_bytes(text.encode("utf-8", "backslashreplace"))
+
+
+def csv_text(rows: Sequence[Mapping[str, object]]) -> str:
+    """Return rows as CSV, under a line of all names that they have."""
+    text = io.StringIO()
+    columns = list(dict.fromkeys(key for row in rows for key in row))
+    writer = csv.DictWriter(text, columns, lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    return text.getvalue()
 
 
 @contextlib.contextmanager

@@ -40,7 +40,9 @@ def test_without_tensorboardx_nothing_is_begun(here, fork):
 
 
 def test_what_training_prints(here, capsys):
-    code, out, err = call(["train", "--episodes", "25", "--log-every", "10", "--no-video"], capsys)
+    code, out, err = call(
+        ["train", "--episodes", "25", "--log-every", "10", "--no-video", "--no-curve"], capsys
+    )
     assert (code, err) == (0, "")
     assert re.search(r"^tuned on mujoco: 25 episodes, seed 0$", out, re.M)
     returns = train(TrainConfig(episodes=25)).returns
@@ -112,7 +114,7 @@ def test_a_terminal_is_told_of_compiling_and_of_the_speed_without_it(here):
 
     reader, writer = pty.openpty()
     cache = {"NUMBA_CACHE_DIR": str(here / "cache"), "TERM": "xterm", "COLUMNS": "120"}
-    command = [sys.executable, "-m", "mjcartpole", *FILM, "run", "--no-video"]
+    command = [sys.executable, "-m", "mjcartpole", *FILM, "run", "--no-video", "--no-curve"]
     process = subprocess.Popen(
         command, stdout=subprocess.DEVNULL, stderr=writer, env={**os.environ, **cache}
     )

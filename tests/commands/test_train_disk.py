@@ -28,19 +28,28 @@ def test_a_full_disk_is_one_line_and_the_last_good_checkpoint_goes_on(
     assert child.err.count("\n") == 1
     assert f"cannot write 'run/{LATEST}': File too large" in child.err
     assert not [name for name in names("run") if name.startswith(".")]
-    code, out, err = call(["train", "--resume", "run"], capsys)
+    code, out, err = call(["train", "--no-curve", "--resume", "run"], capsys)
     assert (code, err) == (0, "")
     assert int(re.search(r"goes on after ([\d,]+) of", out)[1].replace(",", "")) > 10
     assert_equal_runs("run", slow_reference)
 
 
 def test_a_disk_that_is_full_for_the_results_leaves_the_training(here, fork, capsys):
-    command = ["train", "--episodes", "3000", "--backend", "gym", "--no-video", "--run-dir"]
+    command = [
+        "train",
+        "--episodes",
+        "3000",
+        "--backend",
+        "gym",
+        "--no-video",
+        "--no-curve",
+        "--run-dir",
+    ]
     child = fork([*command, "run"], prepare=limit_files(50_000))
     assert child.wait() == 2
     assert child.err.count("\n") == 1
     assert "cannot write 'run/episodes.csv'" in child.err
-    assert call(["train", "--resume", "run"], capsys)[0] == 0
+    assert call(["train", "--no-curve", "--resume", "run"], capsys)[0] == 0
     assert call([*command, "reference"], capsys)[0] == 0
     assert_equal_runs("run", "reference")
 
@@ -55,13 +64,23 @@ def test_a_disk_that_is_full_at_once_leaves_nothing(here, fork):
 
 def test_a_disk_that_is_full_for_the_events_is_one_line(here, fork, capsys):
     pytest.importorskip("tensorboardX")
-    command = ["train", "--episodes", "1000", "--backend", "gym", "--no-video", "--run-dir", "run"]
+    command = [
+        "train",
+        "--episodes",
+        "1000",
+        "--backend",
+        "gym",
+        "--no-video",
+        "--no-curve",
+        "--run-dir",
+        "run",
+    ]
     child = fork([*command, "--tensorboard"], prepare=limit_files(60_000))
     wait_until(lambda: not child.lives(), seconds=20)
     assert child.wait() == 2
     assert child.err.count("\n") == 1
     assert "cannot write" in child.err
-    assert call(["train", "--resume", "run", "--tensorboard"], capsys)[0] == 0
+    assert call(["train", "--no-curve", "--resume", "run", "--tensorboard"], capsys)[0] == 0
 
 
 def in_own_mounts(script):
@@ -79,7 +98,7 @@ def mounts(tmp_path_factory):
         pytest.skip("needs the right to mount a file system")
 
 
-RESUME, REPLACE = "--resume run", "--no-video --overwrite --run-dir run"
+RESUME, REPLACE = "--resume run", "--no-video --no-curve --overwrite --run-dir run"
 
 
 @pytest.mark.usefixtures("mounts")
@@ -105,14 +124,22 @@ def test_a_small_disk_that_fills_up_is_one_line(here, slow_reference, capsys):
     assert process.returncode == 2
     assert process.stderr.count("\n") == 1
     assert "No space left on device" in process.stderr
-    assert call(["train", "--resume", "run"], capsys)[0] == 0
+    assert call(["train", "--no-curve", "--resume", "run"], capsys)[0] == 0
     assert_equal_runs("run", slow_reference)
 
 
 @needs_proc
 @pytest.mark.parametrize("seeds", ["1", "2"])
 def test_a_folder_that_cannot_be_made_is_one_line(seeds, here, capsys):
-    arguments = ["train", "--no-video", "--seeds", seeds, "--run-dir", "/proc/nobody/run"]
+    arguments = [
+        "train",
+        "--no-video",
+        "--no-curve",
+        "--seeds",
+        seeds,
+        "--run-dir",
+        "/proc/nobody/run",
+    ]
     code, out, err = call(arguments, capsys)
     assert (code, out, err.count("\n")) == (2, "", 1)
     assert "cannot make the folder" in err

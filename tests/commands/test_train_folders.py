@@ -17,7 +17,7 @@ def test_one_run_folder_has_one_training_while_it_lives(here, fork, slow_referen
     wait_until((here / "run" / LATEST).exists, child)
     for arguments in (
         [*SLOW, "--run-dir", "run", "--overwrite"],
-        ["train", "--resume", "run"],
+        ["train", "--no-curve", "--resume", "run"],
         ["train", "--resume", f"run/{LATEST}"],
     ):
         code, out, err = call(arguments, capsys)
@@ -26,7 +26,7 @@ def test_one_run_folder_has_one_training_while_it_lives(here, fork, slow_referen
     assert child.lives()
     child.kill()
     child.wait()
-    assert call(["train", "--resume", "run"], capsys)[0] == 0
+    assert call(["train", "--no-curve", "--resume", "run"], capsys)[0] == 0
     assert_equal_runs("run", slow_reference)
 
 
@@ -39,7 +39,7 @@ def test_a_resumed_training_holds_its_folder_too(killed, fork, capsys):
 
 
 def test_a_folder_of_seeds_has_one_training_while_it_lives(here, fork, capsys):
-    seeds = ["train", "--backend", "gym", "--episodes", "400000", "--seeds", "2"]
+    seeds = ["train", "--backend", "gym", "--episodes", "400000", "--no-curve", "--seeds", "2"]
     child = fork([*seeds, "--preset", "article-terminal", "--run-dir", "many"])
     wait_until((here / "many/seed-1/config.json").exists, child)
     for arguments in (
@@ -52,7 +52,18 @@ def test_a_folder_of_seeds_has_one_training_while_it_lives(here, fork, capsys):
         assert "is in use by another training" in err
     child.kill()
     child.wait()
-    short = ["train", "--backend", "gym", "--episodes", "4", "--seeds", "2", "--run-dir", "many"]
+    short = [
+        "train",
+        "--backend",
+        "gym",
+        "--episodes",
+        "4",
+        "--no-curve",
+        "--seeds",
+        "2",
+        "--run-dir",
+        "many",
+    ]
     code, _, err = call([*short, "--overwrite"], capsys)
     assert (code, err) == (0, "")
     assert names("many/seed-0") == sorted(runs.FILES)

@@ -28,9 +28,9 @@ def test_a_run_that_is_killed_again_and_again_ends_as_if_it_was_not(
     rng = random.Random(seed)
     command = [*SLOW, "--run-dir", "run"]
     if seed == 2:
-        call(["train", "--episodes", "3", "--no-video", "--run-dir", "run"], capsys)
+        call(["train", "--episodes", "3", "--no-video", "--no-curve", "--run-dir", "run"], capsys)
         command.append("--overwrite")
-    resume = ["train", "--engine", "python", "--resume", "run", "--no-video"]
+    resume = ["train", "--engine", "python", "--resume", "run", "--no-video", "--no-curve"]
     for _ in range(3):
         child = fork([*command, "--checkpoint-every", rng.choice(["0", "0.02", "0.1"])])
         wait_until((here / "run" / LATEST).exists, child)
@@ -38,7 +38,7 @@ def test_a_run_that_is_killed_again_and_again_ends_as_if_it_was_not(
         child.kill()
         assert child.wait() == -signal.SIGKILL
         command = resume
-    code, out, err = call(["train", "--resume", "run"], capsys)
+    code, out, err = call(["train", "--no-curve", "--resume", "run"], capsys)
     assert (code, err) == (0, "")
     assert re.search(r"goes on after [\d,]+ of 3,000 episodes, seed 0", out)
     assert_equal_runs("run", slow_reference)
@@ -91,10 +91,10 @@ def test_a_kill_at_each_change_of_the_file_system(kind, overwrite, stride, here,
         assert child.wait() == -signal.SIGKILL
         for _ in range(2):
             # Killed once more, anywhere, and then left in peace.
-            resume = ["train", "--resume", "run", "--checkpoint-every", "0"]
+            resume = ["train", "--no-curve", "--resume", "run", "--checkpoint-every", "0"]
             child = fork(resume, prepare=lambda: dies_at(rng.randrange(1, 60)))
             assert child.wait() in {0, 2, -signal.SIGKILL}
-        code, _, err = call(["train", "--resume", "run"], capsys)
+        code, _, err = call(["train", "--no-curve", "--resume", "run"], capsys)
         if code:
             assert re.search("holds no training that could be|no run folder", err), count
             code, _, err = call(begin, capsys)
@@ -116,7 +116,7 @@ KILLED = [
 @pytest.mark.slow
 @pytest.mark.parametrize("config", KILLED, ids=["mujoco", "gym", "python"])
 def test_thirty_runs_killed_at_any_moment_of_their_lives(config, here):
-    command = [sys.executable, "-m", "mjcartpole", "train", "--no-video"]
+    command = [sys.executable, "-m", "mjcartpole", "train", "--no-video", "--no-curve"]
     started = time.monotonic()
     subprocess.run([*command, *config, "--run-dir", "ref"], check=True, capture_output=True)
     lasts, rng = time.monotonic() - started, random.Random(1)
@@ -198,9 +198,9 @@ def test_a_film_that_a_kill_cut_short_keeps_its_name(here, fork, capsys):
     Path("videos/run.mp4").write_text("another's")
     child = fork([*FILM, "run"], prepare=_dies_when_it_has_filmed)
     assert child.wait() == -signal.SIGKILL
-    assert call(["train", "--resume", "run"], capsys)[0] == 0
+    assert call(["train", "--no-curve", "--resume", "run"], capsys)[0] == 0
     assert names("videos") == ["run-2.mp4", "run.mp4"]
-    assert call([*FILM, "other/run", "--no-video"], capsys)[0] == 0
+    assert call([*FILM, "other/run", "--no-video", "--no-curve"], capsys)[0] == 0
     summaries = [
         json.loads(Path(name, "summary.json").read_text()) for name in ("run", "other/run")
     ]

@@ -11,7 +11,7 @@ from mjcartpole.learning import runs
 from nightly import few
 from trainings import names
 
-GYM = ["train", "--backend", "gym", "--no-video", "--run-dir", "run"]
+GYM = ["train", "--backend", "gym", "--no-video", "--no-curve", "--run-dir", "run"]
 
 
 def test_greedy_means_stand_beside_the_table(here, capsys):
@@ -45,7 +45,18 @@ def test_a_training_that_is_solved_is_complete(here, capsys):
 
 
 def test_seeds_say_within_how_many_episodes_they_were_solved(here, capsys):
-    command = ["train", "--backend", "gym", "--until", "60", "--seeds", "3", "--run-dir", "many"]
+    command = [
+        "train",
+        "--backend",
+        "gym",
+        "--until",
+        "60",
+        "--no-curve",
+        "--seeds",
+        "3",
+        "--run-dir",
+        "many",
+    ]
     code, out, err = call(command, capsys)
     assert (code, err) == (0, "")
     solved = [

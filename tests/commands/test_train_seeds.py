@@ -17,7 +17,7 @@ from mjcartpole.physics.load import load_model
 from nightly import few
 from trainings import EACH, assert_equal_runs, dies_at, names, needs_proc, wait_until
 
-FEW = ["train", "--episodes", "12", "--seed", "3"]
+FEW = ["train", "--no-curve", "--episodes", "12", "--seed", "3"]
 
 
 @pytest.fixture(scope="module")
@@ -25,7 +25,7 @@ def three(tmp_path_factory):
     """Each of three seeds, trained alone."""
     folder = tmp_path_factory.mktemp("three")
     for seed in (3, 4, 5):
-        arguments = ["train", "--episodes", "12", "--seed", seed, "--no-video"]
+        arguments = ["train", "--episodes", "12", "--seed", seed, "--no-video", "--no-curve"]
         done([*arguments, "--run-dir", folder / f"alone-{seed}"])
     return folder
 
@@ -115,7 +115,16 @@ def test_seeds_that_are_stopped_go_on(here, fork, capsys):
     assert (code, err) == (0, "")
     assert "stopped" not in out
     for seed in ("0", "1"):
-        alone = ["train", *config, "--seed", seed, "--no-video", "--run-dir", f"alone-{seed}"]
+        alone = [
+            "train",
+            *config,
+            "--seed",
+            seed,
+            "--no-video",
+            "--no-curve",
+            "--run-dir",
+            f"alone-{seed}",
+        ]
         assert call(alone, capsys)[0] == 0
         assert_equal_runs(f"many/seed-{seed}", f"alone-{seed}")
     code, out, _ = call(["train", "--resume", "many"], capsys)
@@ -173,7 +182,10 @@ def test_a_failing_seed_does_not_take_the_others_down(wild, capsys):
     for seed in (3, 4):
         assert re.search(rf"seed {seed} failed: episode \d+, step \d+: .*wild.xml diverged", err)
         assert re.search(rf"^ +{seed} +failed$", out, re.M)
-    assert call([*wild, "--seed", "5", "--no-video", "--run-dir", "alone"], capsys)[0] == 0
+    assert (
+        call([*wild, "--seed", "5", "--no-video", "--no-curve", "--run-dir", "alone"], capsys)[0]
+        == 0
+    )
     assert_equal_runs("many/seed-5", "alone")
     rows = Path("many/seeds.csv").read_text().splitlines()
     assert [row.split(",")[3] for row in rows[1:]] == ["yes", "yes", "no"]

@@ -28,7 +28,7 @@ def test_a_stopped_run_keeps_what_it_learned_and_says_how_to_go_on(
     command, reference = SLOW, slow_reference
     if engine == "compiled":
         config = ["--preset", "article-terminal", "--backend", "gym", "--episodes", "20000"]
-        command, reference = ["train", *config, "--no-video"], "reference"
+        command, reference = ["train", *config, "--no-video", "--no-curve"], "reference"
         assert call([*command, "--run-dir", reference], capsys)[0] == 0
     child = fork([*command, "--run-dir", "run", "--checkpoint-every", "0"])
     wait_until((here / "run" / LATEST).exists, child)
@@ -61,21 +61,21 @@ def test_a_second_ctrl_c_ends_at_once_and_nothing_is_broken(here, fork, slow_ref
     assert child.wait() == 130
     assert child.err.count("\n") == 1
     # What was being written at that moment goes with the next command.
-    assert call(["train", "--resume", "run"], capsys)[0] == 0
+    assert call(["train", "--no-curve", "--resume", "run"], capsys)[0] == 0
     assert not [name for name in names("run") if name.startswith(".")]
     assert_equal_runs("run", slow_reference)
 
 
 @pytest.mark.slow
 def test_a_signal_while_evaluating_leaves_a_run_that_goes_on(here, fork, capsys):
-    command = ["train", "--engine", "python", "--episodes", "200", "--no-video"]
+    command = ["train", "--engine", "python", "--episodes", "200", "--no-video", "--no-curve"]
     child = fork([*command, "--run-dir", "run"])
     wait_until((here / "run" / "summary.json").exists, child)
     child.kill(signal.SIGTERM)
     assert child.wait() == 143
     assert "interrupted after 200 of 200 episodes" in child.err
     assert "train --resume run" in child.err
-    assert call(["train", "--resume", "run"], capsys)[0] == 0
+    assert call(["train", "--no-curve", "--resume", "run"], capsys)[0] == 0
     assert call([*command, "--run-dir", "reference", "--engine", "compiled"], capsys)[0] == 0
     assert_equal_runs("run", "reference")
 
@@ -88,7 +88,7 @@ def test_a_signal_while_filming_leaves_a_run_that_goes_on(here, fork, capsys):
     assert child.wait() == 130
     assert child.err.count("\n") == 1
     assert not list(here.glob("videos/*"))
-    code, out, _ = call(["train", "--resume", "run"], capsys)
+    code, out, _ = call(["train", "--no-curve", "--resume", "run"], capsys)
     assert code == 0
     assert "video  videos/run.mp4" in out
     assert json.loads(Path("run/summary.json").read_text())["video"] == "videos/run.mp4"
@@ -96,7 +96,9 @@ def test_a_signal_while_filming_leaves_a_run_that_goes_on(here, fork, capsys):
 
 
 def test_a_signal_before_anything_was_learned_leaves_nothing(here, fork):
-    child = fork(["train", "--episodes", "2", "--no-video", "--run-dir", "run"], prepare=_stops)
+    child = fork(
+        ["train", "--episodes", "2", "--no-video", "--no-curve", "--run-dir", "run"], prepare=_stops
+    )
     assert child.wait() == 130
     assert child.err == "mjcartpole: interrupted\n"
     assert not Path("run").exists()

@@ -4,7 +4,7 @@ import pytest
 
 from mjcartpole import cli
 
-QUICK = ["--episodes", "3", "--no-video"]
+QUICK = ["--episodes", "3", "--no-video", "--no-curve"]
 """A training that takes no time."""
 
 

@@ -7,13 +7,21 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mjcartpole.learning.episodes import ENDINGS, Columns, Episode, EpisodeLog, ending_index
+from mjcartpole.learning.episodes import (
+    ENDINGS,
+    SIDES,
+    Columns,
+    Episode,
+    EpisodeLog,
+    ending_index,
+    side_index,
+)
 from mjcartpole.task import CARTPOLE_V1
 
 EPISODES = [
-    Episode(0, 12.0, 12, "pole fell"),
+    Episode(0, 12.0, 12, "pole fell", "left"),
     Episode(1, 500.0, 500, "time limit"),
-    Episode(2, 77.0, 77, "off the track"),
+    Episode(2, 77.0, 77, "off the track", "right"),
     Episode(3, 9.0, 9, "pole fell"),
 ]
 
@@ -39,6 +47,20 @@ def logged(episodes=EPISODES, capacity=6):
 )
 def test_why_an_episode_ended(terminated, x, ending):
     assert ENDINGS[ending_index(terminated, x, 2.4)] == ending
+
+
+@pytest.mark.parametrize(
+    ("ending", "x", "theta", "side"),
+    [
+        ("time limit", 9.0, 9.0, ""),
+        ("off the track", 2.5, -0.1, "right"),
+        ("off the track", -2.5, 0.1, "left"),
+        ("pole fell", 1.0, -0.3, "left"),
+        ("pole fell", -1.0, 0.3, "right"),
+    ],
+)
+def test_on_which_side_an_episode_ended(ending, x, theta, side):
+    assert SIDES[side_index(ENDINGS.index(ending), x, theta)] == side
 
 
 def test_a_log_starts_empty():
@@ -71,28 +93,28 @@ def test_slices_are_those_of_a_list(start, stop, step):
 
 
 def test_values_are_plain():
-    number, total, steps, ending = logged()[-1]
-    assert [type(value) for value in (number, total, steps, ending)] == [int, float, int, str]
+    assert [type(value) for value in logged()[0]] == [int, float, int, str, str]
 
 
 def test_columns_are_as_long_as_the_log_and_see_what_it_holds():
     log = logged()
-    totals, steps, endings = log.columns
+    totals, steps, endings, sides = log.columns
     assert totals.tolist() == [12.0, 500.0, 77.0, 9.0]
     assert steps.tolist() == [12, 500, 77, 9]
     assert [ENDINGS[index] for index in endings] == [episode.ending for episode in EPISODES]
-    assert [column.dtype for column in log.columns] == [np.float64, np.int32, np.int8]
+    assert [SIDES[index] for index in sides] == ["left", "", "right", ""]
+    assert [column.dtype for column in log.columns] == [np.float64, np.int32, np.int8, np.int8]
     assert all(np.shares_memory(*pair) for pair in zip(log.columns, log.storage, strict=True))
     assert all(len(column) == 6 for column in log.storage)
 
 
 def test_what_was_written_into_the_storage_counts_once_it_is_said():
     log = logged()
-    for column, value in zip(log.storage, (33.0, 33, 1), strict=True):
+    for column, value in zip(log.storage, (33.0, 33, 1, 2), strict=True):
         column[4] = value
     assert len(log) == 4
     log.extend_to(5)
-    assert list(log) == [*EPISODES, Episode(4, 33.0, 33, "off the track")]
+    assert list(log) == [*EPISODES, Episode(4, 33.0, 33, "off the track", "right")]
 
 
 def test_a_copy_is_independent_in_both_directions():
@@ -115,7 +137,7 @@ def test_a_log_goes_on_from_the_columns_of_another():
     again.append(Episode(5, 3.0, 3, "time limit"))
     assert [episode.number for episode in again] == list(range(6))
     assert (len(log), len(again)) == (4, 6)
-    nothing = Columns(np.empty(0), np.empty(0, np.int32), np.empty(0, np.int8))
+    nothing = Columns(np.empty(0), np.empty(0, np.int32), *(np.empty(0, np.int8),) * 2)
     assert list(EpisodeLog.of(nothing, 3)) == []
 
 

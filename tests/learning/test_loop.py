@@ -1,6 +1,7 @@
 """The reference loop against the same thing written out."""
 
 from itertools import pairwise
+from types import SimpleNamespace
 
 import gymnasium
 import numpy as np
@@ -81,11 +82,13 @@ def test_the_article_presets_do_what_the_articles_code_does(preset, engine):
 class Recorder:
     """Stands in for a learner and its method, pushes to the right, and keeps what it is taught."""
 
-    p = rng = None
+    rng = None
     episodes = 9
 
     def __init__(self):
         self.method = self
+        self.p = SimpleNamespace(tiles=None)
+        self.visits = np.zeros(8, np.int64)
         self.steps, self.whole, self.begun = [], [], []
 
     def quick_memory(self):
@@ -146,6 +149,7 @@ def test_what_a_method_is_taught(terminates):
     ]
     assert learner.steps == [steps] * 2
     assert learner.whole == [([0, 1, 2, 3], [1, 1, 1], [1.0] * 3, 3, terminates)] * 2
+    assert learner.visits.tolist() == [0, 2, 0, 2, 0, 2, 0, 0]
     assert learner.begun == [5, 6], "the schedules see the numbers that were asked for"
     assert [(episode.number, episode.total, episode.steps) for episode in episodes] == [
         (5, 3.0, 3),

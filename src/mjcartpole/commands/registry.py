@@ -13,6 +13,7 @@ from mjcartpole.commands.model import Model
 from mjcartpole.commands.options import Command
 from mjcartpole.commands.page import Page
 from mjcartpole.commands.parity import Parity
+from mjcartpole.commands.plot import Plot
 from mjcartpole.commands.render import Render
 from mjcartpole.commands.train import Train
 from mjcartpole.commands.transfer import Transfer
@@ -27,6 +28,7 @@ COMMANDS: Final[list[type[Command]]] = [
     Doctor,
     Model,
     Transfer,
+    Plot,
     Watch,
 ]
 

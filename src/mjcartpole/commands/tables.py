@@ -1,7 +1,5 @@
 """Policies on models as tables: printed, and written as CSV, JSON and a picture."""
 
-import csv
-import io
 import json
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -9,7 +7,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mjcartpole.commands.options import FAILED
-from mjcartpole.files import check_free, check_writable, free_path, make_folder, write_whole
+from mjcartpole.files import (
+    check_free,
+    check_writable,
+    csv_text,
+    free_path,
+    make_folder,
+    write_whole,
+)
 from mjcartpole.media import plots
 from mjcartpole.studies.sweep import SweepResult
 from mjcartpole.studies.transfer import Cell, TransferResult
@@ -91,7 +96,7 @@ def write_tables(
         FileError: One cannot be written.
     """
     _, as_json, drawn = (table.with_suffix(suffix) for suffix in SUFFIXES)
-    write_whole(table, _csv(rows))
+    write_whole(table, csv_text(rows))
     text = json.dumps(summary, indent=2, allow_nan=False)
     write_whole(as_json, text + "\n")
     if plots.is_installed():
@@ -100,15 +105,6 @@ def write_tables(
         return
     print(f"\nwritten {table} and {as_json.suffix}")
     print(f"mjcartpole: no {drawn.suffix}: {plots.MISSING_LIBRARY}", file=sys.stderr)
-
-
-def _csv(rows: Sequence[Mapping[str, Any]]) -> str:
-    columns = list(dict.fromkeys(key for row in rows for key in row))
-    text = io.StringIO()
-    writer = csv.DictWriter(text, columns, lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows)
-    return text.getvalue()
 
 
 def tell_failed(result: TransferResult) -> int:

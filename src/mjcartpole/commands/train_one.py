@@ -7,7 +7,15 @@ from mjcartpole.commands.options import VIDEOS
 from mjcartpole.commands.printing import counted, print_evaluation
 from mjcartpole.commands.progress import train_session
 from mjcartpole.commands.train_options import RunLocation, TrainOptions
-from mjcartpole.commands.train_shared import about, changes, check, go_on, prepare, unfinished
+from mjcartpole.commands.train_shared import (
+    about,
+    changes,
+    check,
+    draw_curve,
+    go_on,
+    prepare,
+    unfinished,
+)
 from mjcartpole.files import check_writable, make_folder
 from mjcartpole.learning import runs
 from mjcartpole.learning.checkpoints import LATEST
@@ -96,6 +104,7 @@ def _finish(session: Session, begun: Begun, how: TrainOptions, signals: StopSign
         if how.video and begun.video:
             film_result(result, begun.cartpole, folder, summary, signals)
         runs.finish_run(folder)
+        draw_curve(folder, how)
     except Interrupted as interrupted:
         said = f"interrupted after {_done(session)}{_kept(folder)}"
         raise Interrupted(said, signals.number) from interrupted

@@ -40,6 +40,8 @@ class TrainOptions:
 
     video: bool = True
     """Film the first evaluation episode into videos/<run's name>.mp4."""
+    curve: bool = True
+    """Draw the learning curve into the run's folder, last of all, where matplotlib is installed."""
     engine: Engine = "compiled"
     """Who runs the loop; both give the same bits."""
     workers: int | None = None

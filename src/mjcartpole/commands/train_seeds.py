@@ -7,7 +7,7 @@ from mjcartpole.commands import progress
 from mjcartpole.commands.options import FAILED
 from mjcartpole.commands.printing import counted, print_seeds
 from mjcartpole.commands.train_options import RunLocation, TrainOptions
-from mjcartpole.commands.train_shared import about, changes, check, go_on, prepare
+from mjcartpole.commands.train_shared import about, changes, check, draw_curve, go_on, prepare
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.signals import Interrupted, StopSignals
 from mjcartpole.studies import multi_seed_runs
@@ -29,7 +29,7 @@ def train(config: TrainConfig, how: TrainOptions, where: RunLocation, seeds: int
     with signals.caught(), multi_seed_runs.claimed_seeds(folder, overwrite=where.overwrite):
         multi_seed_runs.begin_seeds(folder, config, runner.seeds, cartpole, preset=where.preset)
         _print_head(runner, begun, about(where, folder, config, seeds))
-        return _finish(runner, folder, signals)
+        return _finish(runner, folder, signals, how)
 
 
 def resume(folder: Path, how: TrainOptions) -> int:
@@ -43,7 +43,7 @@ def resume(folder: Path, how: TrainOptions) -> int:
     with signals.caught(), multi_seed_runs.resumed_seeds(folder, how.allow_assets) as begun:
         runner = _runner(begun, folder, how)
         _print_head(runner, begun, changes(begun.preset, begun.config))
-        return _finish(runner, folder, signals)
+        return _finish(runner, folder, signals, how)
 
 
 def _runner(begun: ManyBegun, folder: Path, how: TrainOptions) -> SeedRunner:
@@ -70,7 +70,7 @@ def _print_head(runner: SeedRunner, begun: ManyBegun, more: str) -> None:
     )
 
 
-def _finish(runner: SeedRunner, folder: Path, signals: StopSignals) -> int:
+def _finish(runner: SeedRunner, folder: Path, signals: StopSignals, how: TrainOptions) -> int:
     """Train all seeds or to a signal; write and print."""
     with signals.deferred():
         progress.train_seeds(runner, signals)
@@ -85,6 +85,8 @@ def _finish(runner: SeedRunner, folder: Path, signals: StopSignals) -> int:
             f"learned is kept in {folder}; go on with: {go_on(folder)}",
             signals.number,
         )
+    if many.scores:
+        draw_curve(folder, how)
     for found in many.failed:
         print(f"mjcartpole: error: seed {found.seed} failed: {found.error}", file=sys.stderr)
     return FAILED if many.failed else 0

@@ -13,6 +13,7 @@ from mjcartpole.learning.naming import in_flags, namesakes
 from mjcartpole.learning.run_model import check_storable
 from mjcartpole.learning.session import check_interval
 from mjcartpole.learning.training import training_grid
+from mjcartpole.media import plots
 from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.playable import why_unplayable
 from mjcartpole.physics.simulation import silence_mujoco
@@ -44,6 +45,21 @@ def check(how: TrainOptions) -> None:
     check_interval(how.checkpoint_every)
     if how.tensorboard:
         tensorboard.check_installed()
+
+
+def draw_curve(folder: Path, how: TrainOptions) -> None:
+    """Draw the learning curve beside a run, or beside many seeds; nothing without matplotlib.
+
+    It comes last, when all else is written and said: to import matplotlib takes a while.
+
+    Raises:
+        FileError: It cannot be written.
+    """
+    if not (how.curve and plots.is_installed()):
+        return
+    from mjcartpole.studies.run_curves import curves_of, read_groups
+
+    plots.write_plot(curves_of(read_groups([folder])).figure(), folder / runs.CURVE)
 
 
 def changes(preset: str, config: TrainConfig) -> str:

@@ -18,7 +18,7 @@ _SAID: Final = {None: "where all is alike", True: "yes", False: "no"}
 
 _SHORT: Final = {"--no-mirror": ("--mirror", "no")}
 
-_DASHED_FILE = re.compile(r"-(?!-|o=).+\.(mp4|gif|webp|png|xml|json)")
+_DASHED_FILE = re.compile(r"-(?!-|o=).+\.(mp4|gif|webp|png|svg|pdf|csv|xml|json)")
 """A file whose name begins with a dash: no flag with a single one looks like this."""
 
 

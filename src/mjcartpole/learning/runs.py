@@ -47,13 +47,12 @@ from mjcartpole.physics.load import load_stored
 from mjcartpole.versions import version_of
 
 VERSIONS: Final = "versions.json"
-EPISODES, POLICY, TIMING = "episodes.csv", "policy.json", "timing.json"
+EPISODES, POLICY, VISITS, TIMING = "episodes.csv", "policy.json", "visits.csv", "timing.json"
 BEGINNING: Final = (VERSIONS, MODEL, CONFIG)
 """In the order of writing: what a kill leaves of them is known by the versions."""
-RESULTS: Final = (EPISODES, POLICY, TIMING, SUMMARY)
+RESULTS: Final = (EPISODES, POLICY, VISITS, TIMING, SUMMARY)
 FILES: Final = (*BEGINNING, *RESULTS)
 EVALUATIONS: Final = "evaluations.csv"
-VISITS: Final = "visits.csv"
 CURVE: Final = "curve.png"
 EVENTS: Final = "events.out.tfevents.*"
 """TensorBoard's (see tensorboard.py)."""
@@ -361,7 +360,7 @@ def _own(content: set[str]) -> list[str]:
     """Names of a run's files, those of `content` among them, in the order of their removal."""
     # The config first: without it a folder holds no run, so that two are never mixed.
     events = fnmatch.filter(content, EVENTS)
-    return [CONFIG, MODEL, *events, CURVE, VISITS, EVALUATIONS, *RESULTS, LATEST, FORMER, VERSIONS]
+    return [CONFIG, MODEL, *events, CURVE, EVALUATIONS, *RESULTS, LATEST, FORMER, VERSIONS]
 
 
 def _remove_files(folder: Path, keep: Iterable[str] = ()) -> None:

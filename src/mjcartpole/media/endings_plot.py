@@ -2,12 +2,12 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
-from mjcartpole.media.palette import CURVES, INK
+from mjcartpole.media.palette import INK
 from mjcartpole.media.plots import css, plot_style, short
 
 if TYPE_CHECKING:
@@ -101,15 +101,17 @@ class EndingsPlot:
             axes.bar(0, share, 1, top - share, **_look(number))
 
 
-def _look(number: int) -> dict[str, Any]:
-    """Return how an ending looks: a fall, a cart off the track, a time limit have a colour each.
+LOOKS: Final = (
+    *(((230, 159, 0), ""), ((214, 134, 0), ""), ((252, 214, 128), "")),
+    *(((213, 94, 0), "//"), ((178, 62, 0), "\\\\"), ((240, 150, 84), "//")),
+    ((0, 90, 150), ""),
+)
+"""Colour and hatch of a fall, of a cart off the track (with no side, left, right each), and of the
+time limit: in grey they are told apart by lightness, and by hatches."""
 
-    Sides are told apart by the direction of their hatches; without colours that is enough.
-    """
-    colour = (CURVES[4], CURVES[1], CURVES[5])[number // 3]
-    hatch = (("", "\\\\\\", "///"), ("..", "\\\\\\...", "///..."), ("", "", ""))[number // 3][
-        number % 3
-    ]
+
+def _look(number: int) -> dict[str, Any]:
+    colour, hatch = LOOKS[min(number, len(LOOKS) - 1)]
     return {"facecolor": css(colour), "edgecolor": css(INK), "hatch": hatch, "linewidth": 0.3}
 
 

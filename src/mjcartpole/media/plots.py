@@ -98,7 +98,7 @@ def plot_style() -> Iterator[None]:
         **dict.fromkeys((f"figure.constrained_layout.{side}_pad" for side in "wh"), 0.12),
         **{"axes.titlelocation": "left", "savefig.dpi": 100, "figure.dpi": 100},
         # Ids in an SVG would be drawn by lot.
-        **{"axes.titlepad": 10, "svg.hashsalt": "mjcartpole"},
+        **{"axes.titlepad": 10, "svg.hashsalt": "mjcartpole", "hatch.linewidth": 0.5},
     }
     with matplotlib.style.context(["default", ours]), warnings.catch_warnings():
         # A name may have letters that the font lacks.

@@ -6,6 +6,7 @@ seeds.json      preset, config and seeds; with it the work can be continued
 seed-<n>/       a run (see learning/runs.py) for each seed, as if it were trained alone
 seeds.csv       one line per seed
 aggregate.json  statistics over the seeds
+curve.png       their learning curve, where matplotlib is installed
 """
 
 import contextlib
@@ -27,7 +28,7 @@ from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.studies.seeds import ManyResult, check_seeds, seed_folder
 
 TABLE, AGGREGATE = "seeds.csv", "aggregate.json"
-FILES: Final = (SEEDS, TABLE, AGGREGATE, MODEL, runs.VERSIONS)
+FILES: Final = (SEEDS, TABLE, AGGREGATE, runs.CURVE, MODEL, runs.VERSIONS)
 """In the order of removal: without the seeds a folder holds nothing, and the versions say whose."""
 
 _FIELDS: Final[Fields] = {"preset": str, "seeds": tuple[int, ...], "config": dict}

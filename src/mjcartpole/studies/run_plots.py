@@ -12,9 +12,10 @@ import numpy as np
 import numpy.typing as npt
 
 from mjcartpole.errors import ConfigError, check_known
+from mjcartpole.files import is_folder
 from mjcartpole.learning.episodes import ENDINGS, SIDES
 from mjcartpole.learning.evaluation import EPISODES, evaluate
-from mjcartpole.learning.records import Record
+from mjcartpole.learning.records import Record, read_visits
 from mjcartpole.learning.slices import SHOWN, choose_axes, names_of, slices
 from mjcartpole.media.curve_plot import Curves
 from mjcartpole.media.endings_plot import Endings, EndingsPlot, stretches
@@ -65,7 +66,10 @@ def numbers(kind: Kinds, runs: Sequence[Path], **options: Any) -> Plot:  # noqa:
         return OF_SEVERAL[kind](runs, **options)
     if len(runs) > 1:
         raise ConfigError(f"plot {kind} is for one run, not {len(runs)}")
-    return OF_ONE[kind](find_setup(runs[0]), **options)
+    setup = find_setup(runs[0])
+    if kind == "table" and is_folder(runs[0]):
+        options = {"visits": read_visits(runs[0], setup.policy.discretizer), **options}
+    return OF_ONE[kind](setup, **options)
 
 
 def curve(
@@ -92,6 +96,7 @@ def table(
     over: str | None = None,
     at: At | None = None,
     shown: Sequence[Kind] = SHOWN,
+    visits: npt.NDArray[np.int64] | None = None,
 ) -> Grid:
     """Return slices of a table: greedy action, advantage and visits.
 
@@ -101,6 +106,7 @@ def table(
         over: See `choose_axes`.
         at: See `choose_axes`.
         shown: What: a row each.
+        visits: As `read_visits` gives them.
 
     Raises:
         ConfigError: There is no such dimension, or one is asked for twice.
@@ -108,7 +114,15 @@ def table(
     policy = setup.table
     axes = choose_axes(policy.discretizer, dims, over, at)
     a, b = (limit_along(dimension, setup.task) for dimension in axes.dims)
-    return slices(setup.name, policy.discretizer, policy.q_table, axes, shown=shown, limits=(a, b))
+    return slices(
+        setup.name,
+        policy.discretizer,
+        policy.q_table,
+        axes,
+        visits=visits,
+        shown=shown,
+        limits=(a, b),
+    )
 
 
 def phase(
