@@ -77,7 +77,12 @@ def _of_checkpoint(
 
 
 def _read_episodes(path: Path, config: TrainConfig) -> Columns:
-    before = {"episode": "i8", "return": "f8", "steps": "i4", "ending": "U16"}
+    before = {
+        config.episode.replace(" ", "_"): "i8",
+        "return": "f8",
+        "steps": "i4",
+        "ending": "U16",
+    }
     table = _read_table(path, before | {"side": "U16"}, before)
     endings = _indices(table["ending"], ENDINGS)
     sided = "side" in (table.dtype.names or ())
