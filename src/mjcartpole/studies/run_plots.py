@@ -68,7 +68,7 @@ def numbers(kind: Kinds, runs: Sequence[Path], **options: Any) -> Plot:  # noqa:
         raise ConfigError(f"plot {kind} is for one run, not {len(runs)}")
     setup = find_setup(runs[0])
     if kind == "table" and is_folder(runs[0]):
-        options = {"visits": read_visits(runs[0], setup.policy.discretizer), **options}
+        options = {"visits": read_visits(runs[0], setup.table.discretizer), **options}
     return OF_ONE[kind](setup, **options)
 
 
