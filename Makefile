@@ -7,12 +7,13 @@ CONSTRAINTS ?=
 BIN = $(VENV)/bin
 INSTALL = $(BIN)/python -m pip install --quiet --disable-pip-version-check $(CONSTRAINTS:%=--constraint %)
 
-.PHONY: help train page test test-all coverage lint bench constraints clean
+.PHONY: help train page test-page test test-all coverage lint bench constraints clean
 .DELETE_ON_ERROR:
 
 help:
 	@echo "make train     train a Q-table on MuJoCo, evaluate it, film it (ARGS=... for flags)"
 	@echo "make page      build what \`mjcartpole page\` puts into a page (needs Node.js)"
+	@echo "make test-page the page's own types, lint and tests, and its build, after \`make page\`"
 	@echo "make test      lint, types and the fast tests"
 	@echo "make test-all  the same with the slow tests"
 	@echo "make coverage  the fast tests, and which lines they do not reach"
@@ -24,9 +25,16 @@ train: $(VENV)/installed
 	@$(BIN)/mjcartpole train --backend mujoco $(ARGS)
 
 # MuJoCo in the browser: TypeScript and npm packages become src/mjcartpole/page/assets.
-page:
-	@command -v npm >/dev/null || { echo "make page needs Node.js 20 or newer, with npm" >&2; exit 1; }
-	cd web && npm ci --silent && npm run --silent build
+page: node
+	cd web && npm ci --silent
+	cd web && npm run --silent build
+
+test-page: node
+	cd web && npm run --silent check && npm run --silent test && npm run --silent build
+
+.PHONY: node
+node:
+	@command -v npm >/dev/null || { echo "the page needs Node.js 20 or newer, with npm" >&2; exit 1; }
 
 test: lint
 	$(BIN)/python -m pytest -q -n auto -m "not slow"

@@ -26,7 +26,6 @@ const GYM = `It was trained on gymnasium's own CartPole-v1, and is played here o
 export class App {
   readonly element: HTMLElement;
   readonly stage: Stage | null = null;
-  readonly mujoco: Mujoco | null = null;
   run!: RunData;
   policy!: Policy;
   parity: Parity | null = null;
@@ -40,16 +39,16 @@ export class App {
 
   constructor(
     readonly data: PageData,
-    engine: Mujoco | string,
+    readonly mujoco: Mujoco | null,
+    trouble: string,
   ) {
     const runs = data.runs.map((run, i): [string, string] => [String(i), run.name]);
     const name = runs.length > 1 ? choice("Run", runs, (value) => void this.show(Number(value))) : make("p", {}, data.runs[0].name);
     this.switches = name.querySelector("select");
     this.element = make("main", {}, make("header", {}, make("h1", {}, "mjcartpole"), name, this.badge), this.lead);
-    if (typeof engine === "string") this.element.append(make("p", { class: "alert", role: "alert" }, engine));
-    else {
-      this.mujoco = engine;
-      this.stage = new Stage(engine);
+    if (trouble) this.element.append(make("p", { class: "alert", role: "alert" }, trouble));
+    if (mujoco && !trouble) {
+      this.stage = new Stage(mujoco);
       this.top.append(this.stage.element);
     }
     this.element.append(this.top, this.below);
@@ -70,15 +69,17 @@ export class App {
     this.top.querySelector(".table")?.remove();
     this.top.append(panel.element);
     this.below.replaceChildren(...resultsOf(this.run));
-    if (this.mujoco && this.stage) await this.begin(this.mujoco, this.stage, panel);
-    else panel.showAlone(this.run.parts.hinges.length);
+    if (this.mujoco) await this.begin(this.mujoco, panel);
+    if (!this.stage) panel.showAlone(this.run.parts.hinges.length);
     this.isReady = true;
   }
 
-  private async begin(mujoco: Mujoco, stage: Stage, panel: TablePanel): Promise<void> {
+  private async begin(mujoco: Mujoco, panel: TablePanel): Promise<void> {
     const loader: Loader = { mujoco, files: filesOf(mujoco, this.run), ownTimestep: this.run.own_timestep };
     const own = loadCartPole(loader, this.run.document, this.run.parts);
     await this.check(mujoco, own);
+    const { stage } = this;
+    if (!stage) return;
     this.model = new ModelPanel(loader, own);
     this.model.onModel = (cartpole, isOwn) => this.change(mujoco, stage, cartpole, isOwn);
     this.below.prepend(this.model.element);
