@@ -8,6 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from command_line import done
+from pages import needs_assets
+
 pytestmark = pytest.mark.slow
 
 CHECKOUT = Path(__file__).resolve().parents[1]
@@ -71,3 +74,13 @@ def test_the_wheel_trains_and_renders(elsewhere):
     assert (elsewhere.work / "videos" / "there.mp4").stat().st_size > 1000
     out = elsewhere("-m", "mjcartpole", "evaluate", "runs/there", "--episodes", "5")
     assert "5 episodes" in out
+
+
+def test_the_wheel_writes_the_page_of_the_checkout_without_node(elsewhere, monkeypatch):
+    needs_assets()
+    monkeypatch.setenv("PATH", str(Path(sys.executable).parent))
+    elsewhere("-m", "mjcartpole", "train", "--episodes", "3", "--no-video", "--run-dir", "paged")
+    elsewhere("-m", "mjcartpole", "page", "paged", "-o", "there.html", "--no-plots")
+    done(["page", elsewhere.work / "paged", "-o", elsewhere.work / "here.html", "--no-plots"])
+    pages = [(elsewhere.work / name).read_bytes() for name in ("there.html", "here.html")]
+    assert pages[0] == pages[1]
