@@ -26,6 +26,13 @@ WINDOW = 25
 
 RESAMPLES = 1_000
 
+LEARNERS = [
+    name
+    for name, method in METHODS.items()
+    if not (hasattr(method, "plan") or hasattr(method, "imagine"))
+]
+"""Those that learn from episodes of the world."""
+
 
 def measure(method: str, backend: Backend, options: argparse.Namespace) -> ManyResult:
     """Train and evaluate all seeds of a method."""
@@ -79,7 +86,7 @@ def plot(curves: dict[str, npt.NDArray[np.float64]], path: Path, title: str) -> 
 def main() -> None:
     """Measure, print and plot."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--methods", nargs="*", default=list(METHODS), choices=list(METHODS))
+    parser.add_argument("--methods", nargs="*", default=LEARNERS, choices=list(METHODS))
     parser.add_argument("--backends", nargs="*", default=["mujoco"], choices=["mujoco", "gym"])
     parser.add_argument("--seeds", type=int, default=20)
     parser.add_argument("--first-seed", type=int, default=100)
