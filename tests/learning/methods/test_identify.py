@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from command_line import call
-from engines import ENGINES, outcome
-from mjcartpole.errors import ConfigError
+from engines import DIVERGING, ENGINES, outcome, write
+from mjcartpole.errors import ConfigError, SimulationError
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.documents import read_summary
 from mjcartpole.learning.evaluation import evaluate, evaluate_where_trained
@@ -279,14 +279,29 @@ def test_a_rod_that_hangs_tells_as_much():
     assert hanging.tolist() == pytest.approx(model_of()[0].tolist(), rel=1e-3, abs=1e-5)
 
 
+@pytest.mark.parametrize("fit", FITS)
+def test_whatever_is_seen_there_is_a_dream(fit):
+    for seed, steps in enumerate((1, 2, 3, 4, 9)):
+        values = {"fit": fit, "noise": 100.0, "fit_steps": steps, "seed": seed}
+        found = train(TrainConfig(**IDENTIFY | values), engine="python")
+        assert np.isfinite(found.q_table).all()
+
+
+def test_a_world_that_diverges(tmp_path):
+    wild = write(tmp_path, DIVERGING["wild"])
+    with pytest.raises(SimulationError, match="diverged"):
+        model_of(backend="mujoco", model=wild)
+
+
 @pytest.mark.parametrize(
     ("name", "value", "message"),
     [
         ("fit", "cubic", "fit must be 'rod' or 'linear', not 'cubic'"),
-        ("fit_steps", 0, "fit_steps must be a whole number from 1 to 10,000,000, not 0"),
+        ("fit_steps", 0, "fit_steps must be a whole number from 1 to 1,000,000, not 0"),
         ("fit_steps", 2.0, "fit_steps must be"),
-        ("noise", -0.1, "noise must be a number from 0 up, not -0.1"),
+        ("noise", -0.1, "noise must be a number from 0 to 100, not -0.1"),
         ("noise", math.nan, "noise must be"),
+        ("noise", 1e9, "noise must be"),
         ("td_lambda", 2.0, "td_lambda must be a number from 0 to 1"),
     ],
 )

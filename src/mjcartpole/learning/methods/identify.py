@@ -33,6 +33,8 @@ __all__ = ["act", "after_episode", "after_step", "begin_episode", "greedy_values
 Fit = Literal["rod", "linear"]
 """What is fitted: a rod's own equations, or a linear model without physics."""
 
+MOST_NOISE = 100
+
 ROD_STEPS = 3
 """Each gives two equations, for two unknowns and two."""
 
@@ -60,9 +62,9 @@ class Parameters(q_learning.Parameters):
         super().check_parameters()
         self._check_one_of("fit", ("rod", "linear"))
         if self.fit_steps is not None:
-            self._check_whole("fit_steps", 1, 10_000_000)
-        if not (is_finite(self.noise) and self.noise >= 0):
-            raise ConfigError(f"noise must be a number from 0 up, not {self.noise!r}")
+            self._check_whole("fit_steps", 1, 1_000_000)
+        if not (is_finite(self.noise) and 0 <= self.noise <= MOST_NOISE):
+            raise ConfigError(f"noise must be a number from 0 to {MOST_NOISE}, not {self.noise!r}")
 
     def check_world(self, poles: int, task: Task) -> None:
         """Refuse what the model cannot be one of.
