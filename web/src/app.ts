@@ -81,7 +81,7 @@ export class App {
     const { stage } = this;
     if (!stage) return;
     this.model = new ModelPanel(loader, own);
-    this.model.onModel = (cartpole, isOwn) => this.change(mujoco, stage, cartpole, isOwn);
+    this.model.onModel = (cartpole) => this.change(mujoco, stage, cartpole, own);
     this.below.prepend(this.model.element);
     panel.onStart = (state) => stage.restart(state);
     stage.onFrame = (play, now) => panel.show(play, now);
@@ -89,13 +89,14 @@ export class App {
   }
 
   /** Play on with another model, from the state that there is. */
-  private change(mujoco: Mujoco, stage: Stage, cartpole: CartPole, isOwn: boolean): void {
-    const { state, player, timed } = stage.play;
+  private change(mujoco: Mujoco, stage: Stage, cartpole: CartPole, own: CartPole): void {
+    const { state, player, timed, cartpole: before } = stage.play;
     const play = new Play(mujoco, cartpole, this.run.integrator, this.run.task, this.policy);
     Object.assign(play, { player, timed });
     play.restart(state);
     stage.show(play);
-    this.tell(isOwn);
+    if (before !== own && before !== cartpole) before.model.delete();
+    this.tell(cartpole === own);
   }
 
   /** Replay the recorded episode, and say what came of it. */

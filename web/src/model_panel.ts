@@ -20,8 +20,8 @@ interface Slider {
 /** Edits the model of a run; every change is compiled by MuJoCo here. */
 export class ModelPanel {
   readonly element: HTMLElement;
-  /** Called with another cart-pole, and whether it is the run's own. */
-  onModel: (cartpole: CartPole, isOwn: boolean) => void = () => undefined;
+  /** Called with the cart-pole that is to be played on. */
+  onModel: (cartpole: CartPole) => void = () => undefined;
   private readonly text = make("textarea", { spellcheck: "false", rows: "18", "aria-label": "The model's MJCF", wrap: "off" });
   private readonly error = make("pre", { class: "error", role: "alert", hidden: true });
   private readonly rows = make("div", { class: "sliders" });
@@ -102,11 +102,10 @@ export class ModelPanel {
   private take(documentOf: () => string): boolean {
     try {
       const xml = documentOf();
-      const isOwn = xml === this.own.xml;
-      const cartpole = isOwn ? this.own : loadCartPole(this.loader, xml);
+      const cartpole = xml === this.own.xml ? this.own : loadCartPole(this.loader, xml);
       if (cartpole.hinges.length !== this.own.hinges.length) throw new Unfit("The table is for another number of poles.");
       this.text.value = xml;
-      this.onModel(cartpole, isOwn);
+      this.onModel(cartpole);
       this.error.hidden = true;
     } catch (error) {
       this.error.textContent = wordsOf(error);

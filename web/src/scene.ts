@@ -37,6 +37,8 @@ export class Scene {
   private readonly arrow = new ArrowHelper(new Vector3(1, 0, 0), new Vector3(), 1, ACTION);
   private readonly rope: Line<BufferGeometry, LineBasicMaterial>;
   private cameraName = "side";
+  /** Where a positive x goes, and where the cart is at 0. */
+  private readonly track: [Vector, Vector];
 
   constructor(
     private readonly renderer: WebGLRenderer,
@@ -45,7 +47,9 @@ export class Scene {
     private readonly task: TaskData,
   ) {
     renderer.outputColorSpace = LinearSRGBColorSpace;
-    this.data = new mujoco.MjData(cartpole.model);
+    const { model, slider } = cartpole;
+    this.data = dataAtZero(mujoco, model);
+    this.track = [row(this.data.xaxis, slider), row(this.data.xpos, model.jnt_bodyid[slider])];
     this.drawn = drawnGeoms(cartpole.model, isDark());
     this.ghosts = drawnGeoms(cartpole.model, isDark()).filter(({ moves }) => moves);
     for (const { mesh } of this.ghosts) Object.assign(mesh.material, { transparent: true, opacity: GHOST, depthWrite: false });
@@ -140,11 +144,8 @@ export class Scene {
 
   /** Look from where the whole track fits, +x to the right. */
   private frameTrack(): number {
-    const { model, slider } = this.cartpole;
-    const zero = dataAtZero(this.mujoco, model);
-    const [rail, middle] = [row(zero.xaxis, slider), row(zero.xpos, model.jnt_bodyid[slider])];
-    zero.delete();
-    const up = [0, 0, 1];
+    const { model } = this.cartpole;
+    const [[rail, middle], up] = [this.track, [0, 0, 1]];
     const forward = cross(up, rail);
     const fovy: number = model.vis.global.fovy;
     const distance = (1.2 * (this.task.x_limit ?? 2.4)) / (FILM_ASPECT * Math.tan((fovy * Math.PI) / 360));

@@ -35,7 +35,10 @@ function nothingElseConstrains(model: MjModel): boolean {
 export class Simulation {
   readonly model: MjModel;
   readonly data: MjData;
+  /** Seconds of one control step. */
+  readonly controlStep: number;
   private readonly joints: number[];
+  private readonly timestep: number;
   private readonly explicit: boolean;
 
   constructor(
@@ -46,12 +49,9 @@ export class Simulation {
     this.model = steppingModel(mujoco, cartpole.model, integrator);
     this.data = new mujoco.MjData(this.model);
     this.joints = jointsIn(cartpole);
+    this.timestep = this.model.opt.timestep;
+    this.controlStep = this.timestep * cartpole.substeps;
     this.explicit = integrator === "gym";
-  }
-
-  /** Seconds of one control step. */
-  get controlStep(): number {
-    return this.model.opt.timestep * this.cartpole.substeps;
   }
 
   get state(): number[] {
@@ -81,9 +81,8 @@ export class Simulation {
 
   /** Explicit Euler: positions move by the old velocities. */
   private explicitStep(): void {
-    const h = this.model.opt.timestep;
     const { qpos, qvel } = this.data;
-    const next = this.joints.map((joint) => qpos[joint] + h * qvel[joint]);
+    const next = this.joints.map((joint) => qpos[joint] + this.timestep * qvel[joint]);
     this.mujoco.mj_step(this.model, this.data);
     const { qpos: after } = this.data;
     this.joints.forEach((joint, i) => { after[joint] = next[i]; });

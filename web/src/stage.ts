@@ -72,16 +72,21 @@ export class Stage {
   /** Show another game. */
   show(play: Play): void {
     const before = this.play as Play | undefined;
-    this.scene?.delete();
-    before?.delete();
     this.play = play;
     if (before) play.best = before.best;
-    this.scene = new Scene(this.renderer, this.mujoco, play.cartpole, play.task);
+    this.dress();
+    before?.delete();
+    this.sinceEnd = 0;
+  }
+
+  /** Draw the game's model anew, by day or by night. */
+  private dress(): void {
+    this.scene?.delete();
+    this.scene = new Scene(this.renderer, this.mujoco, this.play.cartpole, this.play.task);
     const names = this.scene.cameras;
     const chosen = names.includes(this.cameras.value) ? this.cameras.value : names[0];
     this.cameras.replaceChildren(...names.map((name) => make("option", { value: name, selected: name === chosen }, name)));
     this.chooseCamera();
-    this.sinceEnd = 0;
   }
 
   private chooseCamera(): void {
@@ -172,6 +177,7 @@ export class Stage {
     for (const name of ["pointerup", "pointercancel"]) canvas.addEventListener(name, () => this.release());
     addEventListener("keydown", (event) => this.key(event, true));
     addEventListener("keyup", (event) => this.key(event, false));
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.dress());
     addEventListener("blur", () => { if (this.play) this.play.keys = 0; });
   }
 
