@@ -15,6 +15,7 @@ from mjcartpole.studies import statistics
 from mjcartpole.studies.statistics import (
     Interval,
     aggregate,
+    bootstrap_band,
     bootstrap_interval,
     improvement_interval,
     iqm,
@@ -343,3 +344,18 @@ def test_the_summary_is_plain():
     assert json.loads(json.dumps(summary)) == summary
     assert {type(value) for value in summary.values()} == {int, float}
     assert (summary["count"], summary["iqm"], summary["solved"]) == (6, 3.5, 0.5)
+
+
+@pytest.mark.parametrize(("average", "statistic"), [("mean", np.mean), ("iqm", iqm)])
+def test_a_band_is_the_interval_at_each_point(average, statistic):
+    curves = np.random.default_rng(3).normal(size=(9, 4))
+    middle, low, high = bootstrap_band(curves, average, resamples=4_000)
+    for point in range(4):
+        expected = bootstrap_interval(curves[:, point], statistic)
+        assert middle[point] == pytest.approx(statistic(curves[:, point]))
+        assert (low[point], high[point]) == pytest.approx(tuple(expected), abs=0.1)
+
+
+def test_runs_that_are_alike_leave_a_band_no_width():
+    for average in ("mean", "iqm"):
+        assert [each.tolist() for each in bootstrap_band([[1.0, 2.0]] * 5, average)] == [[1, 2]] * 3

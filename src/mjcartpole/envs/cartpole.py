@@ -14,7 +14,7 @@ from mjcartpole.envs.actions import STEP_AFTER_END, action_space, invalid
 from mjcartpole.envs.editable import Editable
 from mjcartpole.envs.names import CartPoleNames, refuse_slip
 from mjcartpole.envs.options import reset_options, usual
-from mjcartpole.envs.pictures import Pictures, RenderMode, warn_without_mode
+from mjcartpole.envs.pictures import InNotebooks, Pictures, RenderMode, warn_without_mode
 from mjcartpole.envs.spec import portable
 from mjcartpole.errors import ConfigError, ResetNeededError
 from mjcartpole.integrator import Integrator
@@ -44,7 +44,9 @@ _OWN = ("_simulation", "_pictures", "_model", "_steps_after_end")
 """What even a shallow copy has for itself."""
 
 
-class CartPoleEnv(gymnasium.Env[npt.NDArray[np.float32], np.int64 | int], CartPoleNames):
+class CartPoleEnv(
+    InNotebooks, gymnasium.Env[npt.NDArray[np.float32], np.int64 | int], CartPoleNames
+):
     """CartPole-v1, moved by MuJoCo.
 
     ## Description

@@ -11,12 +11,30 @@ from mjcartpole.errors import ConfigError
 from mjcartpole.media.renderer import DEFAULT_HEIGHT, DEFAULT_WIDTH, Renderer, open_renderer
 from mjcartpole.media.scene import DEFAULT_CAMERA, check_picture
 from mjcartpole.media.window import Window, open_window
+from mjcartpole.physics.bodies import starting_state
 from mjcartpole.physics.cartpole import CartPole
+from mjcartpole.physics.simulation import Simulation
 from mjcartpole.task import Task
 
 RenderMode = Literal["human", "rgb_array"]
 
 _USUAL = (DEFAULT_WIDTH, DEFAULT_HEIGHT, DEFAULT_CAMERA)
+
+
+class InNotebooks:
+    """Shows an environment's state as a picture that needs no OpenGL."""
+
+    simulation: Simulation
+    state: Any
+    _task: Task
+
+    def _repr_html_(self) -> str:
+        from mjcartpole.media.notebook import with_frame  # noqa: PLC0415 - notebooks only
+
+        cartpole, task = self.simulation.cartpole, self._task
+        state = starting_state(cartpole, task) if self.state is None else self.state
+        with open_renderer(cartpole, width=320, height=240, kind="sketch", task=task) as renderer:
+            return with_frame(repr(cartpole), renderer.render(state))
 
 
 class Pictures:

@@ -1,5 +1,6 @@
 """How good is a policy? Greedy episodes, counted."""
 
+import html
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -78,6 +79,15 @@ class Evaluation:
             "minimum": self.minimum,
             "endings": self.endings,
         }
+
+    def _repr_html_(self) -> str:
+        n = max(1, len(self.episodes))
+        rows = "".join(
+            f'<tr><td>{ending}</td><td>{count}</td><td><progress max="{n}" value="{count}">'
+            "</progress></td></tr>"
+            for ending, count in self.endings.items()
+        )
+        return f"<pre>{html.escape(repr(self))}</pre><table>{rows}</table>"
 
     def __repr__(self) -> str:
         played = f"{len(self.episodes)} episodes on {self.backend}, seed {self.seed}"

@@ -111,6 +111,18 @@ class Policy:
         kind, n = ("nodes", grid.n_rows) if grid.interpolated else ("states", grid.n_states)
         return f"Policy({tilings}bins={grid.bins}, {n:,} {kind})"
 
+    def _repr_html_(self) -> str:
+        from mjcartpole.learning.slices import choose_axes, slices  # noqa: PLC0415 - notebooks only
+        from mjcartpole.media.notebook import with_picture, with_plot  # noqa: PLC0415
+
+        grid, table = self.discretizer, self.q_table
+        if len(grid.bins) % 2 or len(grid.bins) < 4:
+            return with_picture(repr(self), None)
+        shown: tuple[Any, ...] = ("action", "advantage")
+        return with_plot(
+            repr(self), lambda: slices("", grid, table, choose_axes(grid), shown=shown)
+        )
+
     @property
     def poles(self) -> int:
         """How many poles the observation has that the table is for."""

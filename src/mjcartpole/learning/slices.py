@@ -157,7 +157,8 @@ def slices(
     """
     for name in shown:
         check_known("picture of a table", name, SHOWN)
-    notes = list[str]()
+    names = names_of(grid)
+    notes = [held] if (held := _held_words(names, axes, grid)) else []
     if "visits" in shown and visits is None:
         shown = [kind for kind in shown if kind != "visits"] or ["action"]
         notes.append("its visits were not counted")
@@ -165,10 +166,8 @@ def slices(
     fields = [
         [_field(kind, *place, grid, table, axes, visits) for place in places] for kind in shown
     ]
-    names = names_of(grid)
-    held = _held_words(names, axes, grid)
     return Grid(
-        f"{title}{held}",
+        title,
         (names[axes.dims[0]], names[axes.dims[1]]),
         fields,
         limits=limits,
@@ -191,7 +190,7 @@ def _held_words(names: Sequence[str], axes: Axes, grid: Discretizer) -> str:
         for index, name in enumerate(names)
         if index not in {*axes.dims, axes.over} and grid.bins[index] > 1
     ]
-    return f", at {', '.join(held)}" if held else ""
+    return f"at {', '.join(held)}" if held else ""
 
 
 def _field(

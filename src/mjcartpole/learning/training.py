@@ -77,6 +77,23 @@ class TrainResult:
     def __repr__(self) -> str:
         return f"TrainResult({self.config!r}, {self.episodes!r}, {self.policy!r})"
 
+    def _repr_html_(self) -> str:
+        from mjcartpole.media.curve_plot import curve_of  # noqa: PLC0415 - notebooks only
+        from mjcartpole.media.notebook import with_picture, with_plot  # noqa: PLC0415
+
+        if not len(self.returns):
+            return with_picture(repr(self), None)
+        greedy, rules = (
+            [(point.episodes, point.mean) for point in self.evaluations],
+            self.config.rules,
+        )
+        return with_plot(
+            repr(self),
+            lambda: curve_of(
+                self.config.method, self.returns, greedy, rules.return_span, rules.reward_threshold
+            ),
+        )
+
 
 @dataclass(frozen=True, eq=False)
 class Snapshot:

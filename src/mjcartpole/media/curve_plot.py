@@ -179,6 +179,23 @@ def line_of_run(
     )
 
 
+def curve_of(
+    name: str,
+    returns: Floats,
+    greedy: Sequence[tuple[int, float]],
+    span: tuple[float | None, float | None],
+    solved_at: float | None,
+) -> Curves:
+    """Return the curve of one run as a whole plot; see `line_of_run` and `Curves`."""
+    window = usual_window(len(returns))
+    return Curves([line_of_run(name, returns, window, greedy)], window, span, solved_at)
+
+
+def usual_window(episodes: int) -> int:
+    """Return over how many episodes means run, of so many: a fortieth."""
+    return max(1, round(episodes / 40))
+
+
 def greedy_points(
     greedy: Sequence[tuple[int, float]],
 ) -> tuple[npt.NDArray[np.int64], Floats] | None:

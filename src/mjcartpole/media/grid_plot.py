@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 import numpy as np
 import numpy.typing as npt
 
-from mjcartpole.media.palette import CURVES, FAINT, INK, MISSING, PAPER
+from mjcartpole.media.palette import CURVES, INK, MISSING, PAPER
 from mjcartpole.media.plots import css, plot_style, short
 
 if TYPE_CHECKING:
@@ -114,14 +114,14 @@ class Grid:
         from matplotlib.figure import Figure  # noqa: PLC0415 - an optional package
 
         height, width = len(self.fields), len(self.fields[0])
-        size = (1.9 + 2.3 * width, 1.1 + 2.1 * height) if width * height > 1 else (7.6, 5.4)
+        size = (1.9 + max(2.3 * width, 4.6), 1.1 + 2.1 * height) if height > 1 else (7.6, 5.2)
         figure = Figure(figsize=size, layout="constrained")
         axes = figure.subplots(height, width, sharex=True, sharey=True, squeeze=False)
         for row, fields in zip(axes, self.fields, strict=True):
             scale = _scale(fields, self.most)
             for ax, each in zip(row, fields, strict=True):
-                mesh = _draw(ax, each, scale)
-                self._mark_limits(ax)
+                mesh = _draw(ax, each, scale, 0.45 if self.paths else 1.0)
+                self._mark_limits(ax, each)
             _explain(figure, row, fields[0].kind, mesh)
         for ax, each in zip(axes[0], self.fields[0], strict=True):
             ax.set_title(short(each.title), fontsize="medium")
@@ -129,14 +129,17 @@ class Grid:
             _draw_path(axes[0, 0], path, number)
         figure.supxlabel(_labelled(self.names[0]), fontsize="medium")
         figure.supylabel(_labelled(self.names[1]), fontsize="medium")
-        said = [short(self.title, 70), *self.notes]
+        said = [short(self.title, 60), *self.notes]
         figure.suptitle("\n".join(said), x=0.01, ha="left", fontsize="large")
         return figure
 
-    def _mark_limits(self, axes: "Axes") -> None:
+    def _mark_limits(self, axes: "Axes", each: Field) -> None:
+        """Draw where episodes end, and let the axes be as long as the field."""
         for limit, draw in zip(self.limits, (axes.axvline, axes.axhline), strict=True):
             for side in () if limit is None else (-limit, limit):
-                draw(side, color=css(FAINT), linewidth=1, linestyle="--")
+                draw(side, color=css(INK), linewidth=0.8, linestyle="--")
+        if not self.paths:
+            axes.set(xlim=each.edges[0][[0, -1]], ylim=each.edges[1][[0, -1]])
 
 
 def _scale(fields: Sequence[Field], most: float | None) -> Any:  # noqa: ANN401
@@ -158,7 +161,7 @@ def _scale(fields: Sequence[Field], most: float | None) -> Any:  # noqa: ANN401
     return colormaps["viridis"], Normalize(0, most or largest)
 
 
-def _draw(axes: "Axes", each: Field, scale: Any) -> Any:  # noqa: ANN401
+def _draw(axes: "Axes", each: Field, scale: Any, alpha: float) -> Any:  # noqa: ANN401
     colours, norm = scale
     axes.set_facecolor(css(PAPER if each.kind == "visits" else MISSING))
     if each.kind == "visits":
@@ -167,7 +170,9 @@ def _draw(axes: "Axes", each: Field, scale: Any) -> Any:  # noqa: ANN401
     masked = np.ma.masked_invalid(each.values)
     if each.kind == "visits":
         masked = np.ma.masked_less(masked, 1)
-    mesh = axes.pcolormesh(*each.edges, masked, cmap=colours, norm=norm, rasterized=True)
+    mesh = axes.pcolormesh(
+        *each.edges, masked, cmap=colours, norm=norm, alpha=alpha, rasterized=True
+    )
     axes.grid(visible=False)
     return mesh
 
@@ -185,10 +190,9 @@ def _wrapped(text: str) -> list[str]:
 
 
 def _draw_path(axes: "Axes", path: Path, number: int) -> None:
-    colour = css(CURVES[(1, 3, 5, 2)[number % 4]])
+    colour = css((INK, CURVES[1], CURVES[0], CURVES[3])[number % 4])
     edge: Any = {"markeredgecolor": css(INK), "color": colour, "zorder": 4}
-    axes.plot(*path.points.T, "-", color=css(INK), linewidth=1.6, alpha=0.9)
-    axes.plot(*path.points.T, "-", color=colour, linewidth=0.9, zorder=3)
+    axes.plot(*path.points.T, "-", color=colour, linewidth=0.6, zorder=3)
     axes.plot(*path.points[0], "o", markersize=5, **edge)
     axes.plot(*path.points[-1], "s" if path.lasted else "X", markersize=7, **edge)
 

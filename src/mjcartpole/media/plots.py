@@ -152,6 +152,13 @@ def svg_of(figure: "Figure") -> str:
     return text.getvalue().decode()
 
 
+def png_of(figure: "Figure") -> bytes:
+    """Return a plot as PNG."""
+    content = io.BytesIO()
+    _save(figure, content, ".png")
+    return content.getvalue()
+
+
 @plot_style()
 def _save(figure: "Figure", target: Path | io.BytesIO, suffix: str) -> None:
     # Of a figure without a layout of its own, what lies around its axes is part of the picture.

@@ -17,12 +17,10 @@ from mjcartpole.media.curve_plot import (
     line_of_run,
     places,
     running_mean,
+    usual_window,
 )
 from mjcartpole.studies.multi_seed_runs import is_seeds, seeds_of
 from mjcartpole.studies.statistics import Average, bootstrap_band
-
-SMOOTHED: float = 40
-"""The running mean is over this part of the longest run, unless something else is asked for."""
 
 Group = tuple[str, list[Record]]
 
@@ -79,7 +77,7 @@ def curves_of(
         ConfigError: The window is no whole number from 1 up.
     """
     longest = max(len(each.columns.totals) for _, records in groups for each in records)
-    window = max(1, round(longest / SMOOTHED)) if window is None else window
+    window = usual_window(longest) if window is None else window
     if window < 1:
         raise ConfigError(f"window must be a whole number of episodes from 1 up, not {window}")
     rules = {each.config.rules for _, records in groups for each in records[:1]}

@@ -160,7 +160,10 @@ def phase(
         drawn.fields,
         paths,
         (a, b),
-        notes=[f"{len(paths)} episodes: from a dot to a square (time limit) or a cross"],
+        notes=[
+            *(f"the table {words}" for words in drawn.notes),
+            f"{len(paths)} episodes: from a dot to a square (time limit) or a cross",
+        ],
     )
 
 
