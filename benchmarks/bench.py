@@ -3,10 +3,11 @@
     python -m benchmarks.bench [--quick] [--json FILE] [--only SECTION …]
 
 Medians over repeats, with the lowest and the highest. Sections: step, vector, threads, training,
-seeds, start, memory. What the figures mean, and where each microsecond goes: docs/performance.md.
+methods, seeds, start, memory. What the figures mean, and where each microsecond goes: docs/performance.md.
 """
 
 import argparse
+import functools
 import itertools
 import json
 import os
@@ -30,6 +31,7 @@ from mjcartpole.envs.backend import Backend
 from mjcartpole.files import write_whole
 from mjcartpole.learning import runs
 from mjcartpole.learning.config import TrainConfig
+from mjcartpole.learning.methods import METHODS
 from mjcartpole.learning.training import Training, train
 from mjcartpole.physics.load import load_model
 from mjcartpole.studies.multi_seed import train_many
@@ -178,6 +180,23 @@ def training(quick: bool) -> Iterator[Ratio]:
     )
 
 
+def methods(quick: bool) -> Iterator[Ratio]:
+    """All of `train()` by each method that learns from episodes, with its defaults."""
+    for method in METHODS:
+        if method == "planning":
+            continue
+        config = TrainConfig(method=method, episodes=300 if quick else 1_000)
+        steps = train(config).steps
+        yield compare(
+            "methods",
+            f"{method} on mujoco, {steps / 1e3:.0f} k steps, against mj_step(nstep=N)",
+            functools.partial(train, config),
+            raw_steps(steps),
+            repeats=5 if quick else 9,
+            wanted=None if method in ("model", "prioritized-sweeping") else 0.9,
+        )
+
+
 def _engines(backend: Backend) -> Ratio:
     """The Python engine gets less to do; what they do per second is compared."""
     short = TrainConfig(episodes=300, backend=backend)
@@ -259,6 +278,7 @@ SECTIONS: dict[str, Section] = {
     "vector": vector,
     "threads": threads,
     "training": training,
+    "methods": methods,
     "seeds": seeds,
     "start": start,
 }

@@ -31,7 +31,7 @@ VALUES = {
     "n_steps": st.integers(1, 12),
     "replay_size": st.sampled_from([1, 2, 5]) | st.integers(1, 500),
     "replays": st.integers(1, 5),
-    "floor": SMALL,
+    "floor": SMALL | st.just(5e-324),
     "successors": st.integers(1, 5),
     "sweeps": st.integers(1, 9),
     "tolerance": SMALL,

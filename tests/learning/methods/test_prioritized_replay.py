@@ -58,7 +58,7 @@ def test_steps_are_drawn_by_their_priorities(at_work):
     found = np.zeros(3)
     q = remembering(at_work, [1.0, 2.0, 5.0])
     for _ in range(8_000):
-        found[find_leaf(q.memory.tree, q.rng.random() * q.memory.tree[1])] += 1
+        found[find_leaf(q.memory.tree, q.rng.random() * q.memory.tree[1], 3)] += 1
     # 5 standard deviations of at most 45.
     np.testing.assert_allclose(found, [1_000, 2_000, 5_000], atol=225)
 
@@ -107,7 +107,7 @@ def test_weights_bring_the_mean_back_that_priorities_shift(at_work, beta, mean):
         q.method.remember(q.p, q.memory, q.transition(0, 0, r, 0, terminated=True))
     found = []
     for _ in range(4_000):
-        i = find_leaf(q.memory.tree, q.rng.random() * q.memory.tree[1])
+        i = find_leaf(q.memory.tree, q.rng.random() * q.memory.tree[1], 4)
         q.method.replay(q.p, q.memory, i, 0.01 * weight(q.p, q.memory, i, beta))
         found.append(q.q[0])
     # Drawn by its error and not weighted, the 1 holds against three zeros where

@@ -45,14 +45,17 @@ from mjcartpole.learning.tiles import Table
 
 __all__ = ["act", "after_episode", "greedy_values"]
 
+RAREST = 1e-100
+"""How likely a step is at least that is drawn, for the sake of a power that floats still hold."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Parameters(TiledParameters):
     """Those of action values, and what is remembered and replayed."""
 
-    replay_size: int = 10_000
+    replay_size: int = 2_000
     """Steps that are remembered, the latest ones."""
-    replays: int = 4
+    replays: int = 2
     """Remembered steps that are learned from after each new one."""
     omega: float = 0.6
     """How much priorities count: 0 replays all alike, 1 in proportion to the error."""
@@ -143,8 +146,9 @@ def after_step(
     if step.over and not p.learn_last_step:
         return
     remember(p, memory, step)
+    known = min(memory.n_steps[0], p.replay_size)
     for part in range(p.replays):
-        i = find_leaf(memory.tree, (part + rng.random()) / p.replays * memory.tree[1])
+        i = find_leaf(memory.tree, (part + rng.random()) / p.replays * memory.tree[1], known)
         replay(p, memory, i, min(1.0, rates.alpha * weight(p, memory, i, rates.beta)))
 
 
@@ -160,7 +164,8 @@ def remember(p: Any, memory: Memory, step: Transition) -> None:
 def weight(p: Any, memory: Memory, i: int, beta: float) -> float:
     """Return by how much longer a step is to be for being drawn more seldom than others."""
     known = min(memory.n_steps[0], p.replay_size)
-    return float((known * weight_of(memory.tree, i) / memory.tree[1]) ** -beta)
+    likely = known * weight_of(memory.tree, i) / memory.tree[1]
+    return float(max(likely, RAREST) ** -beta)
 
 
 def replay(p: Any, memory: Memory, i: int, alpha: float) -> None:

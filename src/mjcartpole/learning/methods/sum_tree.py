@@ -44,8 +44,9 @@ def set_leaf(tree: FloatMemory, leaf: int, weight: float) -> None:
     node = len(tree) // 2 + leaf
     tree[node] = weight
     while node > 1:
+        weight += tree[node ^ 1]  # Its sibling.
         node //= 2
-        tree[node] = tree[2 * node] + tree[2 * node + 1]
+        tree[node] = weight
 
 
 def weight_of(tree: FloatMemory, leaf: int) -> float:
@@ -53,13 +54,18 @@ def weight_of(tree: FloatMemory, leaf: int) -> float:
     return tree[len(tree) // 2 + leaf]
 
 
-def find_leaf(tree: FloatMemory, sum_before: float) -> int:
-    """Return the leaf in whose weight a sum over all, from the first on, comes to lie."""
-    node = 1
-    while 2 * node < len(tree):
+def find_leaf(tree: FloatMemory, sum_before: float, used: int) -> int:
+    """Return the leaf in whose weight a sum over all, from the first on, comes to lie.
+
+    Args:
+        tree: The tree.
+        sum_before: What lies before, in its leaves from the first on.
+        used: How many of the first leaves have a weight: rounding may lift the sum above all.
+    """
+    node, half = 1, len(tree) // 2
+    while node < half:
         node *= 2
-        # Rounding may lift the sum above all weights: to where there is none it does not go.
-        if sum_before >= tree[node] and tree[node + 1] > 0:
+        if sum_before >= tree[node]:
             sum_before -= tree[node]
             node += 1
-    return node - len(tree) // 2
+    return min(node - half, used - 1)
