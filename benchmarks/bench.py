@@ -3,7 +3,8 @@
     python -m benchmarks.bench [--quick] [--json FILE] [--only SECTION …]
 
 Medians over repeats, with the lowest and the highest. Sections: step, vector, threads, training,
-methods, seeds, start, memory. What the figures mean, and where each microsecond goes: docs/performance.md.
+methods, seeds, start, memory. What the figures mean, and where each microsecond goes:
+docs/performance.md.
 """
 
 import argparse
@@ -183,7 +184,7 @@ def training(quick: bool) -> Iterator[Ratio]:
 def methods(quick: bool) -> Iterator[Ratio]:
     """All of `train()` by each method that learns from episodes, with its defaults."""
     for method in METHODS:
-        if method == "planning":
+        if method in ("planning", "identify"):  # They learn from other steps than MuJoCo's.
             continue
         config = TrainConfig(method=method, episodes=300 if quick else 1_000)
         steps = train(config).steps

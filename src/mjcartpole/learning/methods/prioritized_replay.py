@@ -53,7 +53,7 @@ RAREST = 1e-100
 class Parameters(TiledParameters):
     """Those of action values, and what is remembered and replayed."""
 
-    replay_size: int = 2_000
+    replay_size: int = 1_000
     """Steps that are remembered, the latest ones."""
     replays: int = 2
     """Remembered steps that are learned from after each new one."""
