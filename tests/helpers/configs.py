@@ -38,6 +38,8 @@ VALUES = {
     "planning": st.integers(1, 6),
     "threshold": SMALL,
     "predecessors": st.integers(1, 6),
+    "fit_steps": st.none() | st.integers(20, 60),
+    "noise": st.sampled_from([0.0, 1e-9, 1e-3]),
 }
 """Of parameters that are no rates, choices or switches."""
 
