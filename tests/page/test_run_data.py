@@ -52,7 +52,7 @@ def test_the_model_is_the_document_that_runs():
     edited = load_model("long", {"pole.mass": 0.3})
     data = run_data(setup(model=edited, integrator="mujoco"), Told(), "mujoco")
     assert data["document"] == edited.stored[0] and 'mass="0.3"' in data["document"]
-    assert data["parts"]["controls"] == list(edited.controls)
+    assert data["parts"]["controls"] == edited.controls
     assert data["integrator"] == "mujoco" and not data["own_timestep"]
 
 

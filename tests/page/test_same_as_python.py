@@ -1,5 +1,7 @@
 """The page's TypeScript against Python: policies and motion to the bit, edits to 1e-12."""
 
+import json
+
 import numpy as np
 import pytest
 
@@ -139,4 +141,4 @@ def test_an_episode_is_the_same(asked, number):
     assert alone["early"] <= 1e-12
     understood, parts = alone["understood"], run["parts"]
     assert understood.pop("upright") == pytest.approx(parts["upright"], abs=1e-15)
-    assert understood == {name: parts[name] for name in understood}
+    assert understood == json.loads(json.dumps({name: parts[name] for name in understood}))

@@ -18,6 +18,12 @@ ASSETS: Final = Path(__file__).parent / "assets"
 _NAMES: Final = ("page.js", "style.css", "mujoco.wasm.gz")
 _MOST_BYTES: Final = 2**25
 
+_POLICY: Final = (
+    "default-src 'none'; script-src '{script}' 'wasm-unsafe-eval'; style-src '{style}'; "
+    "img-src data:; media-src data:; base-uri 'none'; form-action 'none'"
+)
+"""Lets this script, this style and WebAssembly be, and nothing else."""
+
 _SHELL: Final = """<!doctype html>
 <html lang="en">
 <head>
@@ -61,7 +67,7 @@ def page_html(runs: Sequence[Mapping[str, Any]], assets: Path = ASSETS) -> str:
     }
     names = ", ".join(str(run["name"]) for run in runs)
     return _SHELL.format(
-        policy=_policy(script, style),
+        policy=_POLICY.format(script=_digest(script), style=_digest(style)),
         title=html.escape(f"{names} · mjcartpole"),
         style=style.decode(),
         data=json.dumps(page).replace("<", "\\u003c"),
@@ -86,21 +92,6 @@ def check_built(assets: Path = ASSETS) -> None:
 def _asset(assets: Path, name: str) -> bytes:
     check_built(assets)
     return read_bytes(assets / name, _MOST_BYTES)
-
-
-def _policy(script: bytes, style: bytes) -> str:
-    """Return the Content-Security-Policy that lets these two be and nothing else."""
-    return "; ".join(
-        [
-            "default-src 'none'",
-            f"script-src '{_digest(script)}' 'wasm-unsafe-eval'",
-            f"style-src '{_digest(style)}'",
-            "img-src data:",
-            "media-src data:",
-            "base-uri 'none'",
-            "form-action 'none'",
-        ]
-    )
 
 
 def _digest(content: bytes) -> str:

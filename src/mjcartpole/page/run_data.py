@@ -4,7 +4,7 @@ import base64
 import dataclasses
 import gzip
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -12,15 +12,18 @@ import numpy as np
 import numpy.typing as npt
 
 from mjcartpole.files import read_bytes
-from mjcartpole.learning.policy import Policy
 from mjcartpole.page.told import Told
-from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.studies.film import play
 from mjcartpole.studies.policy_setup import PolicySetup
-from mjcartpole.task import CARTPOLE_V1, CONTROL_STEP, Task
+from mjcartpole.task import CARTPOLE_V1, CONTROL_STEP
 
 _MOST_BYTES: Final = 2**26
 """Of a film, or of a file that a model names."""
+
+
+_PARTS: Final = ("slider", "hinges", "controls", "substeps", "upright")
+_RULES: Final = ("name", "x_limit", "theta_limit", "start_low", "start_high", "time_limit")
+_GRID: Final = ("bins", "low", "high", "tilings", "mirror", "interpolated")
 
 
 def run_data(setup: PolicySetup, told: Told, backend: str) -> dict[str, Any]:
@@ -45,9 +48,9 @@ def run_data(setup: PolicySetup, told: Told, backend: str) -> dict[str, Any]:
         "backend": backend,
         "integrator": setup.integrator,
         "own_timestep": not math.isclose(cartpole.control_step, CONTROL_STEP),
-        "parts": _parts(cartpole),
-        "task": _rules(setup.task),
-        "grid": _grid(setup.table),
+        "parts": _some(cartpole, _PARTS),
+        "task": _some(setup.task, _RULES),
+        "grid": _some(setup.table.discretizer, _GRID),
         "table": packed(setup.table.q_table),
         "episode": {
             "states": packed(rollout.states),
@@ -94,32 +97,10 @@ def _content(source: Path | str) -> bytes:
     return source.encode() if isinstance(source, str) else read_bytes(source, _MOST_BYTES)
 
 
-def _parts(cartpole: CartPole) -> dict[str, Any]:
-    return {
-        "slider": cartpole.slider,
-        "hinges": list(cartpole.hinges),
-        "controls": list(cartpole.controls),
-        "substeps": cartpole.substeps,
-        "upright": list(cartpole.upright),
-    }
-
-
-def _rules(task: Task) -> dict[str, Any]:
-    """Return the rules; JSON has no infinity."""
-    limits = {"x_limit": task.x_limit, "theta_limit": task.theta_limit}
-    return {
-        "name": task.name,
-        **{name: limit if math.isfinite(limit) else None for name, limit in limits.items()},
-        "start_low": task.start_low,
-        "start_high": task.start_high,
-        "time_limit": task.time_limit,
-    }
-
-
-def _grid(policy: Policy) -> dict[str, Any]:
-    grid = policy.discretizer
-    names = ("bins", "low", "high", "tilings", "mirror", "interpolated")
-    return {name: getattr(grid, name) for name in names}
+def _some(of: object, names: Sequence[str]) -> dict[str, Any]:
+    """Return some attributes by name; JSON has no infinity, so that one is None."""
+    values = {name: getattr(of, name) for name in names}
+    return {name: None if value == math.inf else value for name, value in values.items()}
 
 
 def _lines(values: Mapping[str, object]) -> list[list[str]]:
