@@ -172,6 +172,7 @@ def test_public_names():
         "evaluate",
         "load_model",
         "model_names",
+        "plot",
         "register_task",
         "train",
         "train_many",

@@ -41,6 +41,7 @@ FAST = {
         "import gymnasium",
     },
     "docs/performance.md": {"mjcartpole --help"},
+    "docs/plots.md": {"mjcartpole plot table runs/tuned-mujoco-seed0"},
     "docs/tasks.md": {"import math"},
     "docs/variants.md": {
         "mjcartpole evaluate runs/tuned-mujoco-seed0 --set hinge.damping=0.6",
@@ -58,6 +59,7 @@ NOT_HERE = {
     "python3 -m venv .venv": "the test brings an environment that is set up",
     ".venv/bin/pip install -e '.[dev]'": "it loads packages from an index",
     "pip install 'mjcartpole[tensorboard]'": "it loads packages from an index",
+    "pip install 'mjcartpole[plot]'": "it loads packages from an index",
 }
 """Commands that are not run, and why."""
 
@@ -97,6 +99,15 @@ PRINTED = {
 """Blocks that show what a command prints, by their first line; it comes before them."""
 
 PICTURES = {
+    "mjcartpole plot curve runs/tuned-mujoco-seed0 runs/tuned-gym-seeds0-4": {
+        "docs/images/plot_curve.png": "plots/tuned-mujoco-seed0-and-1-others-curve.png",
+    },
+    "mjcartpole plot table runs/tuned-mujoco-seed0": {
+        "docs/images/plot_table.png": "plots/tuned-mujoco-seed0-table.png",
+    },
+    "mjcartpole plot basin runs/tuned-mujoco-seed0": {
+        "docs/images/plot_basin.png": "plots/tuned-mujoco-seed0-basin.png",
+    },
     "mjcartpole transfer runs/tuned-mujoco-seed0 --sweep pole.length=1:31:2": {
         "docs/images/sweep_length.png": "transfer/sweep-pole.length.png",
     },

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from mjcartpole.physics.load import load_model, model_names
     from mjcartpole.physics.simulation import Simulation
     from mjcartpole.studies.multi_seed import train_many
+    from mjcartpole.studies.run_plots import plot
     from mjcartpole.studies.seeds import ManyResult
 
 __version__ = "0.1.0"
@@ -47,6 +48,7 @@ __all__ = [
     "evaluate",
     "load_model",
     "model_names",
+    "plot",
     "register_task",
     "train",
     "train_many",
@@ -65,6 +67,7 @@ _HOMES = {
     "evaluate": "learning.evaluation",
     "load_model": "physics.load",
     "model_names": "physics.load",
+    "plot": "studies.run_plots",
     "train": "learning.training",
     "train_many": "studies.multi_seed",
 }

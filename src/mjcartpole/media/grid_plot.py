@@ -27,6 +27,8 @@ LEGENDS: Final[dict[Kind, str]] = {
 """What a field shows, in words."""
 
 UNITS: Final = {"x": "m", "x_dot": "m/s", "theta": "rad", "theta_dot": "rad/s"}
+NEARLY: Final = 0.02
+"""A limit that is so near to the end of a table is not drawn."""
 _LEFT, _RIGHT = 0.08, 0.95
 """Places of both actions in the map of the advantage: dark and light to every kind of eye."""
 
@@ -127,6 +129,8 @@ class Grid:
             ax.set_title(short(each.title), fontsize="medium")
         for path, number in zip(self.paths, range(len(self.paths)), strict=True):
             _draw_path(axes[0, 0], path, number)
+        if width > 1:
+            axes[0, 0].locator_params(axis="x", nbins=4)
         figure.supxlabel(_labelled(self.names[0]), fontsize="medium")
         figure.supylabel(_labelled(self.names[1]), fontsize="medium")
         said = [short(self.title, 60), *self.notes]
@@ -135,8 +139,12 @@ class Grid:
 
     def _mark_limits(self, axes: "Axes", each: Field) -> None:
         """Draw where episodes end, and let the axes be as long as the field."""
-        for limit, draw in zip(self.limits, (axes.axvline, axes.axhline), strict=True):
-            for side in () if limit is None else (-limit, limit):
+        lines = zip(self.limits, (axes.axvline, axes.axhline), each.edges, strict=True)
+        for limit, draw, edges in lines:
+            # A table reaches as far as the limit, or a little further: its edge says it.
+            if limit is None or abs(limit / edges[-1] - 1) < NEARLY:
+                continue
+            for side in (-limit, limit):
                 draw(side, color=css(INK), linewidth=0.8, linestyle="--")
         if not self.paths:
             axes.set(xlim=each.edges[0][[0, -1]], ylim=each.edges[1][[0, -1]])
