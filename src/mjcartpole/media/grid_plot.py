@@ -130,7 +130,7 @@ class Grid:
         for path, number in zip(self.paths, range(len(self.paths)), strict=True):
             _draw_path(axes[0, 0], path, number)
         if width > 1:
-            axes[0, 0].locator_params(axis="x", nbins=4)
+            axes[0, 0].locator_params(axis="x", nbins=3)
         figure.supxlabel(_labelled(self.names[0]), fontsize="medium")
         figure.supylabel(_labelled(self.names[1]), fontsize="medium")
         said = [short(self.title, 60), *self.notes]
