@@ -11,20 +11,20 @@ import argparse
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from mjcartpole.cores import available_cores
 from mjcartpole.envs.backend import Backend
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.methods import METHODS
-from mjcartpole.media.plots import plot_style, write_plot
+from mjcartpole.media.curve_plot import Curves, Line
+from mjcartpole.media.plots import write_plot
 from mjcartpole.studies.multi_seed import train_many
+from mjcartpole.studies.run_curves import line_of_seeds
 from mjcartpole.studies.seeds import ManyResult
+from mjcartpole.task import CARTPOLE_V1
 
 WINDOW = 25
 """Episodes of the running mean."""
-
-RESAMPLES = 1_000
 
 LEARNERS = [
     name
@@ -53,34 +53,10 @@ def print_row(method: str, backend: str, many: ManyResult) -> None:
     )
 
 
-def running_means(many: ManyResult) -> npt.NDArray[np.float64]:
-    """Return the running mean of each seed's returns, shape (seeds, episodes - WINDOW + 1)."""
-    returns = np.array([found.result.returns for found in many.seeds if found.result is not None])
-    sums = np.cumsum(np.pad(returns, ((0, 0), (1, 0))), axis=1)
-    means: npt.NDArray[np.float64] = (sums[:, WINDOW:] - sums[:, :-WINDOW]) / WINDOW
-    return means
-
-
-@plot_style()
-def plot(curves: dict[str, npt.NDArray[np.float64]], path: Path, title: str) -> None:
-    """Draw all methods on one pair of axes."""
-    from matplotlib.figure import Figure  # noqa: PLC0415 - an optional package
-
-    figure = Figure(figsize=(8.6, 5.4), layout="constrained")
-    axes = figure.add_subplot()
-    rng = np.random.default_rng(0)
-    for number, (name, means) in enumerate(curves.items()):
-        seeds, points = means.shape
-        drawn = means[rng.integers(0, seeds, (RESAMPLES, seeds))].mean(axis=1)
-        low, high = np.percentile(drawn, [2.5, 97.5], axis=0)
-        places = np.arange(WINDOW, WINDOW + points)
-        dashes = ("-", "--", ":", "-.")[number // 4]
-        axes.fill_between(places, low, high, alpha=0.2, linewidth=0)
-        axes.plot(places, means.mean(axis=0), dashes, label=name)
-    axes.set(xlabel=f"episode, running mean over {WINDOW}", title=title, ylim=(0, 510))
-    axes.margins(x=0)
-    figure.legend(loc="outside right upper")
-    write_plot(figure, path)
+def line_of(method: str, many: ManyResult) -> Line:
+    """Return the learning curve of a method: the mean over its seeds, with a band."""
+    results = [found.result.returns for found in many.seeds if found.result is not None]
+    return line_of_seeds(method, results, WINDOW)
 
 
 def main() -> None:
@@ -95,16 +71,16 @@ def main() -> None:
     options = parser.parse_args()
     print(f"{'':22s} {'backend':7s} {'greedy':>7s} {'worst':>7s} {'>=475':>10s} "
           f"{'steps':>10s} {'ns/step':>8s}")  # fmt: skip
-    curves = {}
+    lines = []
     for method in options.methods:
         for backend in options.backends:
             many = measure(method, backend, options)
             print_row(method, backend, many)
             if backend == options.backends[0]:
-                curves[method] = running_means(many)
+                lines.append(line_of(method, many))
     if options.plot:
-        title = f"return while learning on {options.backends[0]}, {options.seeds} seeds"
-        plot(curves, options.plot, title)
+        curves = Curves(lines, WINDOW, CARTPOLE_V1.return_span, CARTPOLE_V1.reward_threshold)
+        write_plot(curves.figure(), options.plot)
 
 
 if __name__ == "__main__":

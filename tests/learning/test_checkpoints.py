@@ -100,6 +100,7 @@ def test_a_training_goes_on_from_its_checkpoint(config, tmp_path):
     for ours, theirs in zip(*(memory.items() for memory in memories), strict=True):
         assert (ours[0], ours[1].tobytes()) == (theirs[0], theirs[1].tobytes())
     assert list(resumed.log) == list(whole.log)
+    assert (resumed.result().visits == whole.result().visits).all()
 
 
 EVALUATED = TrainConfig(backend="gym", episodes=12, evaluate_every=3)
@@ -157,10 +158,17 @@ def test_a_checkpoint_of_a_config_without_what_came_later_is_read(content, scrat
         del about["config"][name]
     archive["about"] = np.frombuffer(json.dumps(about).encode(), np.uint8)
     archive["q_table"] = archive["q_table"].reshape(-1, 2)
+    del archive["state_visits"], archive["sides"]
     packed = io.BytesIO()
     np.savez(packed, **archive)
     scratch.write_bytes(sealed(packed.getvalue()))
-    assert load_checkpoint(scratch, CONFIG, DOCUMENT).episodes == 7
+    found = load_checkpoint(scratch, CONFIG, DOCUMENT)
+    assert found.episodes == 7
+    assert not found.snapshot.columns.sides.any()
+    # What was not counted from the beginning is not known.
+    training = Training(CONFIG, engine="python")
+    training.restore(found.snapshot)
+    assert training.result().visits is training.snapshot().visits is None
 
 
 @pytest.mark.parametrize("step", few([3, 41], 41))
@@ -281,6 +289,9 @@ FORGED = {
     "columns too long": lambda c: forged(
         c, totals=np.zeros(99), steps=np.zeros(99, np.int32), endings=np.zeros(99, np.int8)
     ),
+    "other visits": lambda c: forged(c, state_visits=np.ones(288, np.int64)),
+    "visits of another table": lambda c: forged(c, state_visits=np.ones(3, np.int64)),
+    "sides that there are not": lambda c: forged(c, sides=np.full(7, 3, np.int8)),
     "about is noise": lambda c: forged(c, about=text("{")),
     "about is not text": lambda c: forged(c, about=np.full(9, 255, np.uint8)),
     "about is a list": lambda c: forged(c, about=text("[]")),
