@@ -15,7 +15,7 @@ class RunLocation:
 
     preset: str = "tuned"
     """Where the defaults below come from: tuned, article, article-terminal, two-poles, wieland,
-    damped, endless, quick or planned."""
+    damped, endless, quick, planned or swing-up."""
     run_dir: Path | None = None
     """Folder for the run; runs/<preset>-<backend>-<what was changed>-seed<seed> if left out."""
     overwrite: bool = False
