@@ -1,6 +1,7 @@
 """The page's TypeScript against Python: policies and motion to the bit, edits to 1e-12."""
 
 import json
+import math
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from mjcartpole.page.run_data import run_data
 from mjcartpole.page.told import Told
 from mjcartpole.physics.load import load_model, model_names, models_folder
 from mjcartpole.studies.policy_setup import PolicySetup
+from mjcartpole.task import SWING_UP
 from pages import answers
 
 LOW, HIGH = (-2.4, -0.75, -0.2095, -1.5), (2.4, 0.75, 0.2095, 1.5)
@@ -79,6 +81,16 @@ def setups():
         yield PolicySetup(name, policy_of(grid, 4), model=model, integrator=integrator)
 
 
+def swing_ups():
+    """A table on poles that turn right round, by both integrators."""
+    task = SWING_UP.with_time_limit(120)
+    for model, integrator in (("cartpole", "gym"), ("twopoles", "mujoco")):
+        poles = load_model(model).poles
+        high = (2.4, 3.0) + (math.pi, 9.0) * poles
+        grid = Discretizer((1, 2) + (8, 5) * poles, tuple(-value for value in high), high)
+        yield PolicySetup(f"up-{model}", policy_of(grid, 2), "mujoco", model, integrator, task=task)
+
+
 WANTED = [(name, edits) for name, all_edits in EDITS.items() for edits in all_edits]
 TURNED = text_of("cartpole").replace('"0 0 0.5" mass', '"0 0 0.5" quat="1 0 1 0" mass')
 
@@ -92,7 +104,7 @@ def asked():
     ]
     edits = [{"xml": text_of(name), "edits": edits} for name, edits in WANTED]
     edits.append({"xml": TURNED, "edits": {"pole.length": 2.0}})
-    runs = [run_data(setup, Told(), "mujoco") for setup in setups()]
+    runs = [run_data(setup, Told(), "mujoco") for setup in (*setups(), *swing_ups())]
     return runs, answers(policies=policies, edits=edits, runs=runs)
 
 
@@ -134,7 +146,7 @@ def test_what_cannot_be_stretched_is_refused(asked):
     assert "turned" in asked[1]["edits"][-1]["error"]
 
 
-@pytest.mark.parametrize("number", range(len(model_names()) + 1))
+@pytest.mark.parametrize("number", range(len(model_names()) + 3))
 def test_an_episode_is_the_same(asked, number):
     run, (told, alone) = asked[0][number], asked[1]["runs"][number]
     assert told["steps"] > 5 and told["early"] <= 1e-12

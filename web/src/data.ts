@@ -5,6 +5,8 @@ export interface TaskData {
   /** null: a track without an end. */
   x_limit: number | null;
   theta_limit: number | null;
+  /** What is drawn is added to it; of every value of a state. */
+  start: number[];
   start_low: number;
   start_high: number;
   time_limit: number;
@@ -27,6 +29,8 @@ export interface GridData {
   tilings: number;
   mirror: boolean;
   interpolated: boolean;
+  /** Whether poles may turn right round, so that their angles count from -pi to pi. */
+  turns: boolean;
 }
 
 export interface PictureData {

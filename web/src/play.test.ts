@@ -12,8 +12,8 @@ import { Play } from "./play";
 import { Policy } from "./policy";
 
 const XML = readFileSync(join(import.meta.dirname, "..", "..", "models", "cartpole.xml"), "utf8");
-const TASK: TaskData = { name: "t", x_limit: 2.4, theta_limit: 0.2095, start_low: -0.05, start_high: 0.05, time_limit: 40 };
-const GRID: GridData = { bins: [1, 1, 2, 1], low: [-1, -1, -1, -1], high: [1, 1, 1, 1], tilings: 1, mirror: false, interpolated: false };
+const TASK: TaskData = { name: "t", x_limit: 2.4, theta_limit: 0.2095, start: [0, 0, 0, 0], start_low: -0.05, start_high: 0.05, time_limit: 40 };
+const GRID: GridData = { bins: [1, 1, 2, 1], low: [-1, -1, -1, -1], high: [1, 1, 1, 1], tilings: 1, mirror: false, interpolated: false, turns: false };
 
 let mujoco: Mujoco;
 let loader: Loader;

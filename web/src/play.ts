@@ -52,7 +52,7 @@ export class Play {
   }
 
   /** Start again, from a state or from a drawn one. */
-  restart(state: number[] = drawnStart(this.task, this.simulation.state.length)): void {
+  restart(state: number[] = drawnStart(this.task)): void {
     this.simulation.state = state;
     this.steps = this.due = this.rivalSteps = 0;
     this.ending = this.rivalEnding = null;

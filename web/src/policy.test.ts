@@ -4,7 +4,7 @@ import type { GridData } from "./data";
 import { Policy } from "./policy";
 
 const grid = (changes: Partial<GridData>): GridData => ({
-  bins: [1, 2], low: [-1, -1], high: [1, 1], tilings: 1, mirror: false, interpolated: false, ...changes,
+  bins: [1, 2], low: [-1, -1], high: [1, 1], tilings: 1, mirror: false, interpolated: false, turns: false, ...changes,
 });
 const policy = (changes: Partial<GridData>, table: number[]) => new Policy(grid(changes), Float64Array.from(table));
 

@@ -50,6 +50,14 @@ function cellOf(value: number, axis: Axis): number {
   return Math.min(Math.trunc((value - axis.low) / axis.width), axis.cells - 1);
 }
 
+/** Return an angle as it counts from -pi to pi: see task.py, whose `//` this is. */
+function wrapped(theta: number): number {
+  const turn = 2 * Math.PI;
+  const rest = (theta + Math.PI) % turn;
+  const whole = (theta + Math.PI - rest) / turn - (rest < 0 ? 1 : 0);
+  return theta - turn * Math.round(whole);
+}
+
 /** A greedy policy. */
 export class Policy {
   readonly axes: Axis[];
@@ -64,9 +72,16 @@ export class Policy {
     this.axes = used.map((dimension) => axisOf(grid, dimension, this.parts));
   }
 
+  /** Return a state as it is observed, but for its rounding. */
+  seen(state: ArrayLike<number>): number[] {
+    const isAngle = (i: number) => this.grid.turns && i >= 2 && i % 2 === 0;
+    return Array.from(state, (value, i) => (isAngle(i) ? wrapped(value) : value));
+  }
+
   /** Return the cells of an observation, whose numbers are rounded to float32 first. */
   cells(state: ArrayLike<number>): number[] {
-    return this.axes.map((axis) => cellOf(Math.fround(state[axis.dimension]), axis));
+    const seen = this.seen(state);
+    return this.axes.map((axis) => cellOf(Math.fround(seen[axis.dimension]), axis));
   }
 
   /** Return both values and the better action in a state; action 0 between equals. */

@@ -104,8 +104,7 @@ export function endingOf(task: TaskData, state: number[]): "cart" | "pole" | nul
   return Math.abs(state[0]) > (task.x_limit ?? Infinity) ? "cart" : null;
 }
 
-/** Return a state to start from, each value drawn uniformly. */
-export function drawnStart(task: TaskData, size: number): number[] {
-  const { start_low: low, start_high: high } = task;
-  return Array.from({ length: size }, () => low + (high - low) * Math.random());
+/** Return a state to start from, with a uniform draw in each value. */
+export function drawnStart({ start, start_low: low, start_high: high }: TaskData): number[] {
+  return start.map((value) => value + low + (high - low) * Math.random());
 }

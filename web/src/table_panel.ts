@@ -73,7 +73,7 @@ export class TablePanel {
 
   /** Show the state that a game is in. */
   show(play: Play, now: number): void {
-    this.showState(play.state, now);
+    this.showState(this.policy.seen(play.state), now);
   }
 
   private showState(state: number[], now: number): void {

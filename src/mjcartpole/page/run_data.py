@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from mjcartpole.files import read_bytes
 from mjcartpole.page.told import Told
+from mjcartpole.physics.bodies import starting_state
 from mjcartpole.studies.film import play
 from mjcartpole.studies.policy_setup import PolicySetup
 from mjcartpole.task import CARTPOLE_V1, CONTROL_STEP
@@ -49,8 +50,11 @@ def run_data(setup: PolicySetup, told: Told, backend: str) -> dict[str, Any]:
         "integrator": setup.integrator,
         "own_timestep": not math.isclose(cartpole.control_step, CONTROL_STEP),
         "parts": _some(cartpole, _PARTS),
-        "task": _some(setup.task, _RULES),
-        "grid": _some(setup.table.discretizer, _GRID),
+        "task": {
+            **_some(setup.task, _RULES),
+            "start": starting_state(cartpole, setup.task).tolist(),
+        },
+        "grid": {**_some(setup.table.discretizer, _GRID), "turns": setup.task.turns},
         "table": packed(setup.table.q_table),
         "episode": {
             "states": packed(rollout.states),
