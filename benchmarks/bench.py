@@ -22,6 +22,7 @@ from typing import Any, get_args
 import gymnasium
 import numpy as np
 from benchmarks.article import train_like_the_article
+from benchmarks.methods import LEARNERS
 from benchmarks.others import GymnasiumMujoco, raw_steps
 from benchmarks.ratios import Ratio, compare, seconds
 from mujoco.batch import Batch
@@ -32,7 +33,6 @@ from mjcartpole.envs.backend import Backend
 from mjcartpole.files import write_whole
 from mjcartpole.learning import runs
 from mjcartpole.learning.config import TrainConfig
-from mjcartpole.learning.methods import METHODS
 from mjcartpole.learning.training import Training, train
 from mjcartpole.physics.load import load_model
 from mjcartpole.studies.multi_seed import train_many
@@ -183,9 +183,7 @@ def training(quick: bool) -> Iterator[Ratio]:
 
 def methods(quick: bool) -> Iterator[Ratio]:
     """All of `train()` by each method that learns from episodes, with its defaults."""
-    for method in METHODS:
-        if method in ("planning", "identify"):  # They learn from other steps than MuJoCo's.
-            continue
+    for method in LEARNERS:
         config = TrainConfig(method=method, episodes=300 if quick else 1_000)
         steps = train(config).steps
         yield compare(
