@@ -219,7 +219,7 @@ class _Memory(NamedTuple):
 
 
 def _physics(
-    simulation: Simulation | None, memory: _Memory, task: Task, fitted: Fitted | None
+    simulation: Simulation | None, memory: _Memory, task: Task, fitted: Fitted | None = None
 ) -> Physics:
     if fitted is not None:
         return fitted._replace(start=float(task.start_angle))
