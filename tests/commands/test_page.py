@@ -37,7 +37,7 @@ def test_a_run_becomes_a_page_of_its_name(run, here, capsys):
     (data,) = data_of(here / "mine.html")
     facts, config = dict(data["facts"]), dict(data["config"])
     assert data["name"] == "mine" and data["film"] is None
-    assert facts["Episodes"] == "3" and re.fullmatch(r"\d+ of 100", facts["Pole fell"])
+    assert facts["Episodes"] == "3" and re.fullmatch(r"\d+ of 100", facts["Greedy: pole fell"])
     assert config["preset"] == "tuned" and config["seed"] == "8"
     assert dict(data["versions"])["mujoco"].startswith("3.")
 

@@ -85,7 +85,7 @@ def facts_of(summary: dict[str, Any]) -> Table:
         facts["Mean greedy return"] = f"{played['mean']:.5g}"
         facts["Least of them"] = f"{played['minimum']:.5g}"
         ends = played["endings"].items()
-        facts |= {how.capitalize(): f"{n} of {played['episodes']}" for how, n in ends if n}
+        facts |= {f"Greedy: {how}": f"{n} of {played['episodes']}" for how, n in ends if n}
     return facts
 
 
