@@ -206,8 +206,9 @@ SWING_UP: Final = Task("SwingUp-v0", theta_limit=math.inf, start_angle=math.pi, 
 CONTINUOUS: Final = dataclasses.replace(CARTPOLE_V1, name="Continuous-v0", continuous=True)
 """CartPole-v1 with any force between those of its two actions."""
 
-for _each in (CARTPOLE_V1, SWING_UP, CONTINUOUS):
-    register(_each)
+register(CARTPOLE_V1)
+register(SWING_UP)
+register(CONTINUOUS)
 
 
 def task_named(name: str) -> Task:

@@ -27,7 +27,7 @@ export class Fan {
     const { model } = cartpole;
     this.geoms = Array.from({ length: model.ngeom }, (_, i) => i).filter((i) => bodies.has(model.geom_bodyid[i]));
     this.wedges = spans(limit).map(([from, to, opacity]) => wedgeOf(from, to, opacity));
-    this.group.add(...this.wedges.map(({ mesh }) => mesh));
+    for (const { mesh } of this.wedges) this.group.add(mesh);
   }
 
   /** Put it where the hinge is. */
