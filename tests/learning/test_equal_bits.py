@@ -110,9 +110,7 @@ def _tasks():
     st.floats(0, 1),
     st.tuples(*[st.sampled_from(ENGINES)] * 2),
 )
-@settings(
-    max_examples=at_night(300, fast=10), suppress_health_check=list(HealthCheck), deadline=None
-)
+@settings(max_examples=at_night(300, fast=10), suppress_health_check=list(HealthCheck))
 def test_any_config_gives_the_same_bits_also_resumed(tmp_path, config, share, engines):
     found = assert_engines_agree(config)
     assert len(found["returns"]) == config.episodes

@@ -111,7 +111,7 @@ def test_what_contradicts_the_rest_is_named(name, field, change):
 
 
 @given(st.data())
-@settings(max_examples=at_night(300, fast=10), deadline=None)
+@settings(max_examples=at_night(300, fast=10))
 def test_what_is_taken_can_be_learned_from(data):
     """Each entry that is changed to what others of its field are: refused, or harmless."""
     name, field = data.draw(st.sampled_from(whole_fields()))
