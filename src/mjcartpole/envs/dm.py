@@ -175,7 +175,7 @@ class Balance(control.Task):  # type: ignore[misc]
         self.steps = 0
         self._controls = cartpole.controls
         self._limit = limit
-        self._rules = rules
+        self._rules, self._middle = rules, starting_state(cartpole, rules)
         self._discrete = discrete
         self._visualize_reward = False
 
@@ -200,7 +200,7 @@ class Balance(control.Task):  # type: ignore[misc]
         low, high = self._rules.start_low, self._rules.start_high
         size = 2 * len(physics.cartpole.joints)
         drawn = self.random.uniform(low=low, high=high, size=size)
-        physics.set_state(drawn + starting_state(physics.cartpole, self._rules))
+        physics.set_state(drawn + self._middle)
         self._show_reward(physics)
         self.steps = 0
 

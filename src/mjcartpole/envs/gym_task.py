@@ -8,7 +8,7 @@ import numpy.typing as npt
 from gymnasium import spaces
 
 from mjcartpole.envs.actions import action_space, push_of
-from mjcartpole.task import Task, control_of, wrapped
+from mjcartpole.task import Task, control_of
 
 Observation = npt.NDArray[np.float32]
 
@@ -36,12 +36,12 @@ class GymTask(gymnasium.Wrapper[Observation, np.int64, Observation, np.int64]):
     ) -> tuple[Observation, dict[str, Any]]:
         """Start an episode where the task does, unless the options say otherwise."""
         bounds = {"low": self._task.start_low, "high": self._task.start_high}
-        observation, info = self.env.reset(seed=seed, options=bounds | (options or {}))
+        _, info = self.env.reset(seed=seed, options=bounds | (options or {}))
         if self._task.start_angle:
             x, x_dot, theta, theta_dot = self._cartpole.state  # type: ignore[attr-defined]
             state = np.array([x, x_dot, theta + self._task.start_angle, theta_dot])
             self._cartpole.state = state  # type: ignore[attr-defined]
-        return self._seen(observation), info
+        return self._seen().astype(np.float32), info
 
     def step(self, action: Any) -> tuple[Observation, float, bool, bool, dict[str, Any]]:  # noqa: ANN401
         """Advance one control step; the reward is the task's.
@@ -53,16 +53,13 @@ class GymTask(gymnasium.Wrapper[Observation, np.int64, Observation, np.int64]):
             # Action 1 has the push of this step.
             self._cartpole.force_mag = control_of(push_of(action), (-self._force, self._force))  # type: ignore[attr-defined]
             action = 1
-        observation, _, terminated, truncated, info = self.env.step(action)
-        x, x_dot, theta, theta_dot = map(float, self._cartpole.state)  # type: ignore[attr-defined]
-        if self._task.turns:
-            theta = wrapped(theta)
+        _, _, terminated, truncated, info = self.env.step(action)
+        seen = self._seen()
+        x, x_dot, theta, theta_dot = seen.tolist()
         reward = self._task.reward(x, x_dot, theta, theta_dot, terminated)
-        return self._seen(observation), reward, terminated, truncated, info
+        return seen.astype(np.float32), reward, terminated, truncated, info
 
-    def _seen(self, observation: Observation) -> Observation:
-        """The observation of the state, where a pole may turn or starts elsewhere."""
-        if not (self._task.turns or self._task.start_angle):
-            return observation
+    def _seen(self) -> npt.NDArray[np.float64]:
+        """The state as the rules have it."""
         state = np.array(self._cartpole.state, dtype=np.float64)  # type: ignore[attr-defined]
-        return self._task.seen(state).astype(np.float32)
+        return self._task.seen(state)
