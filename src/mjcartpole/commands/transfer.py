@@ -13,8 +13,10 @@ from mjcartpole.errors import ConfigError
 from mjcartpole.integrator import Integrator
 from mjcartpole.learning.evaluation import EPISODES, SEED, Player
 from mjcartpole.studies.eval_target import EvalTarget
+from mjcartpole.task import CARTPOLE_V1
 
 if TYPE_CHECKING:
+    from mjcartpole.physics.load import ModelLike
     from mjcartpole.studies.policy_setup import PolicySetup
     from mjcartpole.task import Task
 
@@ -94,17 +96,21 @@ class Transfer(Command):
             raise ConfigError(
                 f"a sweep edits one model, not {len(self.models)}; give one, or no --sweep"
             )
-        known = *self.models, *(self._set_up(source).model for source in self.sources), "cartpole"
         name = "sweep-" + re.sub(r"[^\w.-]+", "-", key)
         target = tables.free_table(self.output, name, self.overwrite)
-        curve = sweep(
-            policies, known[0], key, values, edits=self.set, **self._physics, **self._play
-        )
+        settings = {"edits": self.set, **self._physics, **self._play}
+        curve = sweep(policies, self._edited_model(), key, values, **settings)
         tables.print_sweep(curve)
         _say_seeds(policies)
         summary = curve.summary()
         tables.write_tables(target, summary["points"], summary, lambda: curves(curve))
         return tables.tell_failed(curve.played)
+
+    def _edited_model(self) -> "ModelLike":
+        """Return the model of a sweep: the one asked for, the first policy's, or the reference."""
+        if self.models:
+            return self.models[0]
+        return self._set_up(self.sources[0]).model if self.sources else "cartpole"
 
     @property
     def _physics(self) -> dict[str, Any]:
@@ -117,11 +123,8 @@ class Transfer(Command):
 
     def _task(self) -> "Task":
         """Return by whose rules is played: those asked for, or all that the policies know."""
-        from mjcartpole.studies.policy_setup import controller_setup
-
-        trained = [self._set_up(source).task for source in self.sources]
-        asked = [controller_setup(name, self._rules).task for name in self.policy]
-        known = dict.fromkeys(trained or asked)
+        known = dict.fromkeys(self._set_up(source).task for source in self.sources)
+        known = known or {self._rules.rules(CARTPOLE_V1): None}
         if len(known) > 1:
             names = " and ".join(f"{task.name} ({task.time_limit:,} steps)" for task in known)
             raise ConfigError(

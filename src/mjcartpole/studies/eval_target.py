@@ -5,6 +5,7 @@ from pathlib import Path
 
 from mjcartpole.envs.backend import Backend
 from mjcartpole.integrator import Integrator
+from mjcartpole.task import Task, task_named
 
 
 @dataclass(frozen=True)
@@ -29,3 +30,15 @@ class EvalTarget:
     """The rules: limits, starting states, reward, time limit; the run's own if left out."""
     max_episode_steps: int | None = None
     """Control steps until an episode is truncated; the rules' own if left out."""
+
+    def rules(self, otherwise: Task) -> Task:
+        """Return the rules that are played by.
+
+        Args:
+            otherwise: Where no task is named.
+
+        Raises:
+            ConfigError: There is no such task, or there are no such episodes.
+        """
+        named = task_named(self.task) if self.task else otherwise
+        return named.with_time_limit(self.max_episode_steps)

@@ -19,7 +19,7 @@ from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.load import ModelLike, load_model
 from mjcartpole.studies import multi_seed_runs
 from mjcartpole.studies.eval_target import EvalTarget
-from mjcartpole.task import CARTPOLE_V1, Task, task_named
+from mjcartpole.task import CARTPOLE_V1, Task
 
 WHERE_TRAINED: Final = EvalTarget()
 
@@ -112,8 +112,7 @@ def _placed(
         played_on = run.cartpole(target.allow_assets, own_timestep=own_timestep)
     if target.set or (own_timestep and played_on == model):
         played_on = load_model(played_on, target.set, own_timestep=own_timestep)
-    rules = task_named(target.task) if target.task else config.rules
-    rules = rules.with_time_limit(target.max_episode_steps)
+    rules = target.rules(config.rules)
     return PolicySetup(name, policy, backend, played_on, integrator, seed, rules)
 
 
