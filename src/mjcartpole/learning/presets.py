@@ -5,13 +5,17 @@ from typing import Any, Final
 
 from mjcartpole.task import CARTPOLE_V1, SWING_UP
 
+
+def _grid(bins: tuple[int, ...], high: tuple[float, ...]) -> dict[str, Any]:
+    """Return a grid about 0, which all of these are."""
+    return {"bins": bins, "low": tuple(-value for value in high), "high": high}
+
+
 # The article's ranges, as its code has them: the float32 bound of the angle, and 3.5 rad/s.
 _ARTICLE_THETA: Final = float(CARTPOLE_V1.observation_bound()[2])
 _ARTICLE: dict[str, Any] = {
     "episodes": 12_000,
-    "bins": (1, 1, 25, 25),
-    "low": (-2.4, -1.0, -_ARTICLE_THETA, -3.5),
-    "high": (2.4, 1.0, _ARTICLE_THETA, 3.5),
+    **_grid((1, 1, 25, 25), (2.4, 1.0, _ARTICLE_THETA, 3.5)),
     "gamma": 0.95,
     "alpha": 0.1,
     "alpha_final": 0.1,
@@ -29,9 +33,7 @@ _ARTICLE: dict[str, Any] = {
 # A cart that is to stay on the track has to be seen there, and its speed as well.
 _ENDLESS: dict[str, Any] = {
     "episodes": 3_000,
-    "bins": (4, 4, 6, 4),
-    "low": (-2.4, -1.5, -0.2095, -1.0),
-    "high": (2.4, 1.5, 0.2095, 1.0),
+    **_grid((4, 4, 6, 4), (2.4, 1.5, 0.2095, 1.0)),
     "tilings": 8,
     "gamma": 0.995,
     "alpha": 0.3,
@@ -51,9 +53,7 @@ _DAMPED: dict[str, Any] = {
 _TWO_POLES: dict[str, Any] = {
     "model": "twopoles",
     "episodes": 15_000,
-    "bins": (4, 4, 5, 5, 5, 5),
-    "low": (-2.0, -0.75, -0.1, -0.4, -0.2095, -1.5),
-    "high": (2.0, 0.75, 0.1, 0.4, 0.2095, 1.5),
+    **_grid((4, 4, 5, 5, 5, 5), (2.0, 0.75, 0.1, 0.4, 0.2095, 1.5)),
     "tilings": 8,
     "gamma": 0.998,
     "alpha": 0.3,
@@ -71,17 +71,14 @@ _WIELAND: dict[str, Any] = {
     "own_timestep": True,
     "max_episode_steps": 1_000,
     "episodes": 6_000,
-    "low": (-2.0, -0.75, -0.1, -0.4, -0.2095, -3.0),
-    "high": (2.0, 0.75, 0.1, 0.4, 0.2095, 3.0),
+    **_grid(_TWO_POLES["bins"], (2.0, 0.75, 0.1, 0.4, 0.2095, 3.0)),
     "log_every": 600,
 }
 # Values drawn at random leave no ties: what acts while learning is the greedy policy itself.
 _QUICK: dict[str, Any] = {
     "method": "model",
     "episodes": 60,
-    "bins": (1, 3, 4, 8),
-    "low": (-2.4, -0.75, -0.2095, -1.5),
-    "high": (2.4, 0.75, 0.2095, 1.5),
+    **_grid((1, 3, 4, 8), (2.4, 0.75, 0.2095, 1.5)),
     "epsilon": 0.0,
     "epsilon_final": 0.0,
     "q_init_low": 49.0,
@@ -93,9 +90,7 @@ _QUICK: dict[str, Any] = {
 _SWING_UP: dict[str, Any] = {
     "task": SWING_UP.name,
     "episodes": 10_000,
-    "bins": (5, 7, 32, 21),
-    "low": (-2.4, -3.0, -math.pi, -9.0),
-    "high": (2.4, 3.0, math.pi, 9.0),
+    **_grid((5, 7, 32, 21), (2.4, 3.0, math.pi, 9.0)),
     "gamma": 0.99,
     "alpha": 0.2,
     "alpha_final": 0.02,
@@ -109,9 +104,7 @@ _SWING_UP: dict[str, Any] = {
 _PLANNED: dict[str, Any] = {
     "method": "planning",
     "episodes": 100,
-    "bins": (13, 13, 17, 17),
-    "low": (-2.4, -2.5, -0.2095, -2.5),
-    "high": (2.4, 2.5, 0.2095, 2.5),
+    **_grid((13, 13, 17, 17), (2.4, 2.5, 0.2095, 2.5)),
     "log_every": 10,
 }
 
