@@ -77,3 +77,4 @@ def test_many_lines_have_no_raw_returns_behind_them():
 @pytest.mark.parametrize("n", [1, 2])
 def test_the_shortest_runs_can_be_drawn(n, tmp_path):
     write_plot(curve_of("a", np.full(n, 3.0), [], (None, None), None).figure(), tmp_path / "a.svg")
+    assert (tmp_path / "a.svg").stat().st_size > 1_000

@@ -90,3 +90,4 @@ def test_where_there_is_nothing_a_plot_is_still_one(tmp_path):
     empty = np.full((3, 2), np.nan)
     for kind in LEGENDS:
         write_plot(grid([field(kind, empty)]).figure(), tmp_path / f"{kind}.pdf")
+        assert (tmp_path / f"{kind}.pdf").stat().st_size > 1_000
