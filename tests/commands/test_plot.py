@@ -11,6 +11,7 @@ import pytest
 from PIL import Image
 
 from mjcartpole import cli
+from mjcartpole.learning import compiled
 
 pytest.importorskip("matplotlib")
 TRAIN = ["train", "--backend", "gym", "--episodes", "8", "--no-video"]
@@ -42,6 +43,8 @@ def runs(tmp_path_factory):
 @pytest.fixture
 def here(runs, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
+    # Where the compiler's cache is cold, the first of these tests would be told so on stderr.
+    monkeypatch.setattr(compiled._Announcer, "said", True)
     for name in ("one", "many"):
         Path(name).symlink_to(runs / name)
 
