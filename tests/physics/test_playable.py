@@ -59,8 +59,8 @@ def test_what_cannot_be_balanced(case, integrator):
     model, edits, advice = HOPELESS[case]
     line = why_unplayable(load_model(model, edits, own_timestep="long" in case), integrator)
     assert line is not None
-    assert re.match("(no|hardly any) policy can balance this: from ", line)
-    assert line.startswith("no") == ("from 8 of 8 " in line)
+    assert re.match("no policy can balance this( from most starts)?: from ", line)
+    assert ("from most starts" in line) == ("from 8 of 8 " not in line)
     assert advice in line
     assert "\n" not in line
 
@@ -75,12 +75,12 @@ def test_what_a_policy_may_balance(case, integrator):
 
 @both
 @pytest.mark.parametrize("case", COARSE)
-def test_what_hardly_any_policy_can_balance(case, integrator):
-    """Some sequence of actions lasts, but three of the same end an episode from upright."""
+def test_what_is_hard_to_balance(case, integrator):
+    """Three steps of the same action end an episode from upright."""
     model, edits = COARSE[case]
     cartpole = load_model(model, edits, own_timestep="0.1 s" in case)
     line = why_unplayable(cartpole, integrator)
-    assert line.startswith("hardly any policy can balance this: from upright at rest either action")
+    assert line.startswith("hard to balance: from upright at rest either action")
     lengths = [
         lasted(Simulation(cartpole, integrator), np.zeros(4), [action] * 9) for action in (0, 1)
     ]
@@ -117,8 +117,30 @@ def test_the_gallery(name, integrator):
     assert why_unplayable(cartpole, integrator) is None
 
 
-def test_wielands_short_pole_is_too_short_for_two_hundredths_of_a_second():
-    assert "hardly any policy" in why_unplayable(load_model("wieland"))
+def test_wielands_short_pole_is_hard_and_no_more_at_two_hundredths_of_a_second():
+    """A table balances it in 20,000 episodes (docs/variants.md)."""
+    assert why_unplayable(load_model("wieland")).startswith("hard to balance: ")
+
+
+@pytest.mark.parametrize("case", COARSE)
+def test_what_is_hard_can_be_balanced_by_looking_one_step_ahead(case):
+    model, edits = COARSE[case]
+    simulation = Simulation(load_model(model, edits, own_timestep="0.1 s" in case))
+    for start in np.random.default_rng(0).uniform(-0.05, 0.05, (8, 4)).tolist():
+        state = start
+        for _ in range(100):
+            state = min((moved(simulation, state, action) for action in (0, 1)), key=danger)
+            assert not CARTPOLE_V1.has_ended(state[0], state[2])
+
+
+def moved(simulation, state, action):
+    simulation.state = state
+    return simulation.step(simulation.cartpole.controls[action])
+
+
+def danger(state) -> float:
+    """How far the pole will lean after a quarter of a second at this rate."""
+    return abs(state[2] + 0.25 * state[3])
 
 
 @pytest.mark.parametrize("case", HOPELESS)
