@@ -53,9 +53,12 @@ def starting_state(cartpole: CartPole, task: Task) -> Vector:
     return state
 
 
-def data_at_zero(model: mujoco.MjModel) -> mujoco.MjData:
-    """Return where all bodies are when all coordinates are 0, which a `ref` can move elsewhere."""
-    data = mujoco.MjData(model)
+def data_at_zero(model: mujoco.MjModel, data: mujoco.MjData | None = None) -> mujoco.MjData:
+    """Return where all bodies are when all coordinates are 0, which a `ref` can move elsewhere.
+
+    Written into `data` of the model, if some are given: to make them costs as much as to compile.
+    """
+    data = mujoco.MjData(model) if data is None else data
     data.qpos[:] = 0.0
     mujoco.mj_kinematics(model, data)
     return data

@@ -10,6 +10,7 @@ import mujoco
 
 from mjcartpole.physics.cache import remembered
 from mjcartpole.physics.cartpole import CartPole
+from mjcartpole.physics.edit.document import Document
 from mjcartpole.physics.guard import compile_document
 from mjcartpole.physics.includes import read_whole
 from mjcartpole.physics.sanity_checks import check_motion, check_numbers
@@ -45,6 +46,19 @@ def build(text: str, name: str, path: Path | None = None) -> CartPole:
     return dataclasses.replace(remembered(text, make), name=name)
 
 
+def build_edited(document: Document, name: str) -> CartPole:
+    """Return as `build` the cart-pole of a document that was whole and had numbers changed since.
+
+    Raises:
+        ModelError: It does not compile any more, or is no cart-pole.
+    """
+    text = document.text
+    if _NAMES_FILE.search(text):
+        return build(text, name)
+    made = remembered(text, lambda: find_parts(name, text, compile_document(document, name)))
+    return dataclasses.replace(made, name=name)
+
+
 def compile_text(
     text: str, name: str, folder: Path, inside: Sequence[Path] | None = None
 ) -> tuple[str, mujoco.MjModel]:
@@ -68,11 +82,12 @@ def find_parts(name: str, xml: str, model: mujoco.MjModel) -> CartPole:
         slider, hinges = find_joints(model)
         controls = find_controls(model, slider)
         found = CartPole(name, xml, model, slider, hinges, controls, 1, ())
+        data = mujoco.MjData(model)
         # From the cart outwards: which way a pole on a pole stands depends on the one below it.
-        upright = tuple(count_from_upright(found, pole) for pole in range(found.poles))
+        upright = tuple(count_from_upright(found, pole, data) for pole in range(found.poles))
         check_limits(found)
-        check_independent(found)
+        check_independent(found, data)
     except UnfitError as unfit:
         raise refusal(name, model, unfit) from None
-    check_motion(found)
+    check_motion(found, data)
     return dataclasses.replace(found, upright=upright)

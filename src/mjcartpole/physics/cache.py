@@ -8,7 +8,7 @@ import mujoco
 from mjcartpole.physics.cartpole import CartPole
 
 MOST: Final = 32
-"""How many are kept; the oldest make room."""
+"""How many are kept; the one that was not asked for longest makes room."""
 
 LARGEST: Final = 2**20
 """Bytes of a document and its compiled model, beyond which it is not kept."""
@@ -22,11 +22,9 @@ def remembered(key: Hashable, make: Callable[[], CartPole]) -> CartPole:
     No lock: a fork in another thread would leave it locked in the child. At worst two threads
     make the same.
     """
-    found = _kept.get(key)
-    if found is None:
-        found = make()
-        if len(found.xml) + mujoco.mj_sizeModel(found.model) <= LARGEST:
-            _kept[key] = found
-            for oldest in list(_kept)[:-MOST]:
-                _kept.pop(oldest, None)
+    found = _kept.pop(key, None) or make()
+    if len(found.xml) + mujoco.mj_sizeModel(found.model) <= LARGEST:
+        _kept[key] = found
+        for oldest in list(_kept)[:-MOST]:
+            _kept.pop(oldest, None)
     return found

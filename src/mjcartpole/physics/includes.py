@@ -112,8 +112,10 @@ class _Reader:
 
     def read(self, text: str, name: str) -> tuple[Document, list[Asset]]:
         """Return a document with its includes in their place, and the files that it names."""
-        text, origins = self._flat(text, name, None)
         document = _parse(text, name)
+        whole, origins = self._flat(document, name, None)
+        if whole != text:
+            document = _parse(whole, name)
         root = document.root.tag
         if root != "mujoco":
             urdf = " (a URDF; MuJoCo can save it as MJCF)" if root == "robot" else ""
@@ -135,10 +137,11 @@ class _Reader:
         self.left = reader.left
         return found
 
-    def _flat(self, text: str, name: str, origin: Path | None) -> tuple[str, list[Path | None]]:
+    def _flat(
+        self, document: Document, name: str, origin: Path | None
+    ) -> tuple[str, list[Path | None]]:
         """Return a document's text, or an included one's content, and its elements' origins."""
-        document = _parse(text, name)
-        content = text.encode()
+        content = document.text.encode()
         start, end = (0, len(content)) if origin is None else document.content(document.root)
         pieces: list[bytes] = []
         origins: list[Path | None] = []
@@ -176,7 +179,8 @@ class _Reader:
         self.included.add(real)
         who = f"'{file}', which {name} includes,"
         self.folders.check(path, who)
-        return self._flat(self._text(path, who), f"'{file}'", path.parent)
+        included = _parse(self._text(path, who), f"'{file}'")
+        return self._flat(included, f"'{file}'", path.parent)
 
     def _text(self, path: Path, who: str) -> str:
         if self.left <= 0:

@@ -3,6 +3,7 @@
 import functools
 import itertools
 from collections.abc import Iterator
+from operator import attrgetter
 from typing import Any, Final
 
 import mujoco
@@ -47,7 +48,10 @@ def check_numbers(name: str, model: mujoco.MjModel) -> None:
         raise ModelError(f"{name} has a timestep of {model.opt.timestep:g} s; use 0.02")
     for part in ("model", "opt", "stat"):
         owner = _part(model, part)
-        for field in _float_fields(part):
+        fields = _float_fields(part)
+        if np.isfinite(np.concatenate(attrgetter(*fields)(owner), axis=None)).all():
+            continue
+        for field in fields:
             values = getattr(owner, field)
             bad = np.isnan(values) if field in _MAY_BE_INFINITE else ~np.isfinite(values)
             if bad.any():
@@ -76,14 +80,13 @@ def _amounts(model: mujoco.MjModel) -> Iterator[tuple[int, int, str]]:
         yield asked, most, f"{drawn}: look at <visual><quality>"
 
 
-def check_motion(cartpole: CartPole) -> None:
-    """Refuse a model whose first step already ends in nonsense.
+def check_motion(cartpole: CartPole, data: mujoco.MjData) -> None:
+    """Refuse a model whose first step already ends in nonsense; overwrites `data`.
 
     Raises:
         ModelError: MuJoCo gives up, or an acceleration is no number.
     """
     name, model = cartpole.name, cartpole.model
-    data = mujoco.MjData(model)
     for control, start in itertools.product(cartpole.controls, (0.0, _ASIDE)):
         mujoco.mj_resetData(model, data)
         data.qpos[:], data.qvel[:], data.ctrl[0] = start, start, control

@@ -173,10 +173,10 @@ def is_servo(model: mujoco.MjModel) -> bool:
     return bool(biased and model.actuator_biasprm[motor, 1:3].any())
 
 
-def directions(cartpole: CartPole, pole: int = 0) -> Directions:
-    """Return where the cart and one pole point when all coordinates are 0."""
+def directions(cartpole: CartPole, pole: int = 0, data: mujoco.MjData | None = None) -> Directions:
+    """Return where the cart and one pole point when all coordinates are 0 (see `data_at_zero`)."""
     model, joint = cartpole.model, cartpole.hinges[pole]
-    data = data_at_zero(model)
+    data = data_at_zero(model, data)
     axis = data.xaxis[joint].copy()
     arm = _centre(cartpole, pole, data) - data.xanchor[joint]
     arm = arm - (arm @ axis) * axis
@@ -210,17 +210,17 @@ def _up(gravity: Vector) -> Vector:
     return up
 
 
-def count_from_upright(cartpole: CartPole, pole: int) -> float:
+def count_from_upright(cartpole: CartPole, pole: int, data: mujoco.MjData) -> float:
     """Have a pole's angle count from upright, if it does not; return the angle that became 0, rad.
 
     It is what the attribute `ref` does in a document: the pose stays, its coordinate moves, in
     place. No derived value of the model depends on it. Of angles a full turn apart it is one
-    inside the joint's limits.
+    inside the joint's limits. `data` are some of the model's, which are overwritten.
 
     Raises:
         UnfitError: No push tilts the pole, or something else in the model counts by the old angle.
     """
-    upright = _checked_directions(cartpole, pole).upright
+    upright = _checked_directions(cartpole, pole, data).upright
     if abs(upright) <= LARGEST_LEAN:
         return 0.0
     model, hinge = cartpole.model, cartpole.hinges[pole]
@@ -239,9 +239,9 @@ def count_from_upright(cartpole: CartPole, pole: int) -> float:
     return upright
 
 
-def _checked_directions(cartpole: CartPole, pole: int) -> Directions:
+def _checked_directions(cartpole: CartPole, pole: int, data: mujoco.MjData) -> Directions:
     """Refuse a pole that no push along the rail tilts, and a wheel among several poles."""
-    found, several = directions(cartpole, pole), cartpole.poles > 1
+    found, several = directions(cartpole, pole, data), cartpole.poles > 1
     name = cartpole.model.joint(cartpole.hinges[pole]).name or f"number {pole + 1}"
     which = f" ('{name}')" if several else ""
     if abs(found.rail @ found.up) > 1 - LEAST_COUPLING**2:
@@ -259,8 +259,8 @@ def _checked_directions(cartpole: CartPole, pole: int) -> Directions:
     return found
 
 
-def check_independent(cartpole: CartPole) -> None:
-    """Refuse several hinges of which one adds no motion of its own.
+def check_independent(cartpole: CartPole, data: mujoco.MjData) -> None:
+    """Refuse several hinges of which one adds no motion of its own; overwrites `data`.
 
     Raises:
         UnfitError: The inertia of all joints together is singular.
@@ -268,8 +268,8 @@ def check_independent(cartpole: CartPole) -> None:
     if cartpole.poles == 1:
         return
     model = cartpole.model
-    data, inertia = data_at_zero(model), np.empty((model.nv, model.nv))
-    mujoco.mj_fwdPosition(model, data)
+    inertia = np.empty((model.nv, model.nv))
+    mujoco.mj_fwdPosition(model, data_at_zero(model, data))
     mujoco.mj_fullM(model, data, inertia)
     scale = np.sqrt(np.maximum(inertia.diagonal(), mujoco.mjMINVAL))
     if np.linalg.eigvalsh(inertia / np.outer(scale, scale))[0] < LEAST_INERTIA:

@@ -24,6 +24,7 @@ DEEPEST: Final = 200
 """Levels of elements inside each other."""
 
 _COMMENT: Final = re.compile(rb"<!--(.*?)-->", re.DOTALL)
+_BLANK: Final = bytes(byte if byte in b"\r\n" else ord(" ") for byte in range(256))
 _SPACED_TAG: Final = re.compile(rb"<(\s+)(?=[A-Za-z])")
 
 _ATTRIBUTE: Final = re.compile(rb"""\s+([^\s=/>"']+)\s*=\s*("[^"]*"|'[^']*')""")
@@ -58,9 +59,11 @@ class Element:
 
     def walk(self) -> Iterator["Element"]:
         """Return the element and all in it, in the order of the document."""
-        yield self
-        for child in self.children:
-            yield from child.walk()
+        waiting = [self]
+        while waiting:
+            element = waiting.pop()
+            yield element
+            waiting += reversed(element.children)
 
     def find(self, tag: str) -> "list[Element]":
         """Return its children of a tag; those inside a <frame> count as its own."""
@@ -217,7 +220,7 @@ def made_strict(text: str) -> str:
     """
 
     def blank(found: re.Match[bytes]) -> bytes:
-        return b"<!--" + re.sub(rb"[^\r\n]", b" ", found[1]) + b"-->"
+        return b"<!--" + found[1].translate(_BLANK) + b"-->"
 
     without_comments = _COMMENT.sub(blank, text.encode("utf-8"))
     return _SPACED_TAG.sub(rb"\1<", without_comments).decode("utf-8")

@@ -12,7 +12,7 @@ import numpy as np
 from mjcartpole import task
 from mjcartpole.errors import ConfigError
 from mjcartpole.physics.bodies import cart_bodies, mass_of
-from mjcartpole.physics.build import build
+from mjcartpole.physics.build import build, build_edited
 from mjcartpole.physics.cartpole import CartPole, Vector
 from mjcartpole.physics.edit.document import Document, Element
 from mjcartpole.physics.edit.element_path import find_element
@@ -118,7 +118,7 @@ def apply_meanings(document: Document, values: Mapping[str, float], name: str) -
         set_mass(parts, cart_bodies(cartpole), "cart", whole["cart.mass"])
     centres = [_edit_pole(document, cartpole, pole, wanted) for pole, wanted in enumerate(by_pole)]
     name += f" with {', '.join(f'{key}={value:g}' for key, value in values.items())}"
-    after = build(document.text, name)
+    after = build_edited(document, name)
     _check_outcome(_found(after), whole)
     for pole, wanted in enumerate(by_pole):
         found = _found_of_joint(after, after.hinges[pole], "hinge")
@@ -163,7 +163,7 @@ def _edit_pole(
     if "pole.length" in values:
         longer = set_length(Parts(document, before), values["pole.length"], pole)
     if "pole.length" in values or "pole.mass" in values:
-        stretched = build(document.text, before.name)
+        stretched = build_edited(document, before.name)
         set_pole_mass(Parts(document, stretched), values.get("pole.mass", wanted.mass), pole)
     return longer * wanted.com
 
