@@ -179,7 +179,7 @@ def play_on(part: tuple[TrainConfig, Policy, int, int]) -> npt.NDArray[np.int64]
         backend=config.backend,
         model=config.load_model() if config.backend == "mujoco" else "cartpole",
         integrator=config.integrator,
-        task=config.rules.with_time_limit(steps),
+        task=config.rules.with_changes(max_episode_steps=steps),
         episodes=PART,
         seed=SEED + number,
     )

@@ -19,6 +19,7 @@ PACKAGE = Path(mjcartpole.__file__).parent
 LAYERS = [
     "errors",
     "cores",
+    "rewards",
     "task",
     "integrator",
     "leftovers",

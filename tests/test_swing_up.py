@@ -16,7 +16,8 @@ from mjcartpole.learning.evaluation import evaluate
 from mjcartpole.learning.training import train
 from mjcartpole.physics.bodies import starting_state
 from mjcartpole.physics.load import load_model
-from mjcartpole.task import SWING_UP, upright, wrapped
+from mjcartpole.rewards import upright
+from mjcartpole.task import SWING_UP, wrapped
 
 CHAIN = "tests/models/chain.xml"
 GRID = {"bins": (1, 3, 8, 6), "low": (-2.4, -3.0, -math.pi, -9.0), "high": (2.4, 3.0, math.pi, 9.0)}

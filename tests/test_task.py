@@ -12,10 +12,12 @@ from hypothesis import strategies as st
 from mjcartpole import task
 from mjcartpole.envs.registration import register_task
 from mjcartpole.errors import ConfigError
+from mjcartpole.rewards import upright
 from mjcartpole.task import CARTPOLE_V1, TASKS, Task, resolve, worst_pole
 
 UP = math.inf
 X, THETA = CARTPOLE_V1.x_limit, CARTPOLE_V1.theta_limit
+PUNISHING = CARTPOLE_V1.with_changes(reward="minus-one-at-the-end")
 
 
 @pytest.mark.parametrize(
@@ -75,7 +77,7 @@ def test_numbers_are_gymnasiums():
     ("task", "most"),
     [
         (CARTPOLE_V1, 500),
-        (CARTPOLE_V1.with_sutton_barto_reward(), 0),
+        (PUNISHING, 0),
         (Task("own", reward=lambda *state: state[0]), UP),
     ],
 )
@@ -84,32 +86,27 @@ def test_the_most_that_an_episode_returns(task, most):
 
 
 def test_episodes_of_another_length_are_solved_by_as_large_a_share_of_them():
-    assert CARTPOLE_V1.with_time_limit(None) is CARTPOLE_V1.with_time_limit(500) is CARTPOLE_V1
-    short, other = (task.with_time_limit(100) for task in (CARTPOLE_V1, Task("none agreed")))
+    for usual in (None, 500):
+        assert CARTPOLE_V1.with_changes(max_episode_steps=usual) is CARTPOLE_V1
+    both = CARTPOLE_V1, Task("none agreed")
+    short, other = (each.with_changes(max_episode_steps=100) for each in both)
     assert (short.time_limit, short.reward_threshold, short.x_limit) == (100, 95.0, X)
     assert (other.time_limit, other.reward_threshold) == (100, None)
-    punished = dataclasses.replace(CARTPOLE_V1.with_sutton_barto_reward(), reward_threshold=-0.1)
-    assert punished.with_time_limit(7).reward_threshold is None
+    punished = dataclasses.replace(PUNISHING, reward_threshold=-0.1)
+    assert punished.with_changes(max_episode_steps=7).reward_threshold is None
 
 
 @pytest.mark.parametrize("steps", [0, -1, 2.5, True, 10**7 + 1])
 def test_episodes_that_have_no_length_are_refused(steps):
     with pytest.raises(ConfigError, match="from 1 to 10,000,000, not"):
-        CARTPOLE_V1.with_time_limit(steps)
+        CARTPOLE_V1.with_changes(max_episode_steps=steps)
 
 
 @pytest.mark.parametrize(("terminated", "sutton_barto"), [(False, 0.0), (True, -1.0)])
 def test_reward(terminated, sutton_barto):
     state = (0.1, 0.2, 0.3, 0.4)
     assert CARTPOLE_V1.reward(*state, terminated) == 1.0
-    assert CARTPOLE_V1.with_sutton_barto_reward().reward(*state, terminated) == sutton_barto
-
-
-@pytest.mark.parametrize("reward", task.CONSTANT)
-@given(state=st.tuples(*[st.floats(allow_nan=False)] * 4))
-def test_constant_rewards_are_constant(reward, state):
-    assert reward(*state, False) == task.CONSTANT[reward]
-    assert reward(*state, True) == reward(0.0, 0.0, 0.0, 0.0, True)
+    assert PUNISHING.reward(*state, terminated) == sutton_barto
 
 
 @pytest.mark.parametrize(
@@ -128,6 +125,47 @@ def test_constant_rewards_are_constant(reward, state):
 def test_rules_that_make_no_sense(rules):
     with pytest.raises(ConfigError, match=next(iter(rules))):
         Task("odd", **rules)
+
+
+def test_some_rules_are_others():
+    changed = resolve("CartPole-v1", x_limit=np.float32(0.5), theta_limit=UP, start_low=0)
+    assert changed == dataclasses.replace(CARTPOLE_V1, x_limit=0.5, theta_limit=UP, start_low=0.0)
+    assert changed.changes == {"x_limit": 0.5, "theta_limit": UP, "start_low": 0.0}
+    assert resolve(changed.name, **changed.changes) == changed
+    same = {"x_limit": 2.4, "reward": "one-per-step", "start_angle": None}
+    assert CARTPOLE_V1.with_changes(**same) is CARTPOLE_V1
+    assert CARTPOLE_V1.with_changes(reward=upright).reward_threshold is None
+    assert CARTPOLE_V1.with_changes(reward="upright").reward is upright
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"x_limit": 0}, r"x_limit must be a number \(m\) more than 0 .* infinite, not 0"),
+        ({"x_limit": 1e11}, "at most 1e"),
+        ({"theta_limit": -0.1}, r"theta_limit must be a number \(rad\) more than 0"),
+        ({"theta_limit": "wide"}, "not 'wide'"),
+        ({"theta_limit": True}, "not True"),
+        ({"theta_limit": 10**400}, "theta_limit must be"),
+        ({"start_low": math.nan}, r"start_low must be a number \(m, m/s, rad, rad/s\) from -1e"),
+        ({"start_high": UP}, "start_high must be"),
+        ({"start_low": 0.06}, r"start_low \(0\.06\) is above start_high \(0\.05\)"),
+        ({"start_angle": [1]}, r"start_angle must be a number \(rad\)"),
+        ({"start_angle": 3.1}, r"between theta = 3\.05 and 3\.15 rad, all beyond theta_limit"),
+        ({"start_high": 9, "start_low": 3}, r"between x = 3 and 9 m, all beyond x_limit, 2\.4"),
+        ({"reward": "uprigth"}, "'uprigth' is unknown; .* did you mean 'upright'"),
+        ({"reward": 1.0}, "reward must be one of one-per-step, .* or a function, not 1.0"),
+    ],
+)
+def test_changes_that_make_no_sense_are_told_in_one_line(changes, message):
+    with pytest.raises(ConfigError, match=message) as told:
+        CARTPOLE_V1.with_changes(**changes)
+    assert "\n" not in str(told.value)
+
+
+def test_no_such_rule():
+    with pytest.raises(TypeError, match="unexpected keyword argument 'x_limits'"):
+        CARTPOLE_V1.with_changes(x_limits=1.0)
 
 
 def test_the_worst_pole_is_what_the_rules_look_at():

@@ -7,14 +7,15 @@ doi:10.1109/TSMC.1983.6313077).
 
 import dataclasses
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final, TypeAlias, TypeVar
+from typing import Any, Final, SupportsFloat, TypedDict, TypeVar, Unpack, cast
 
 import numpy as np
 import numpy.typing as npt
 
 from mjcartpole.errors import ConfigError, check_known
+from mjcartpole.rewards import CONSTANT, REWARDS, Reward, one_per_step, upright
 
 CONTROL_STEP: Final = 0.02
 """Seconds between two actions."""
@@ -22,37 +23,24 @@ CONTROL_STEP: Final = 0.02
 MOST_STEPS: Final = 10_000_000
 """Of one episode: two days and a half."""
 
+FARTHEST: Final = 1e10
+"""Of any position, velocity and limit, in m, m/s, rad or rad/s: what MuJoCo still calls sane."""
+
 _TURN: Final = 2 * math.pi
 
 Number = TypeVar("Number", float, npt.NDArray[np.float64])
 """One, or many."""
 
-Reward: TypeAlias = Callable[[float, float, float, float, bool], float]
-"""From the state after a step (x, x_dot, theta, theta_dot; m, m/s, rad, rad/s) and whether it ends
-the episode by the rules. Of several poles, theta and theta_dot are those of largest size. A plain
-function of numbers: the compiled engine compiles it as it is."""
 
+class Changes(TypedDict, total=False):
+    """Rules that are to be others than the task's; None leaves one as it is. See `Task`."""
 
-def one_per_step(x: float, x_dot: float, theta: float, theta_dot: float, terminated: bool) -> float:
-    """Return 1: CartPole-v1's reward, also of the step that ends the episode."""
-    return 1.0
-
-
-def minus_one_at_the_end(
-    x: float, x_dot: float, theta: float, theta_dot: float, terminated: bool
-) -> float:
-    """Return -1 for the step that ends the episode, 0 for others: Sutton and Barto's reward."""
-    return -1.0 if terminated else 0.0
-
-
-def upright(x: float, x_dot: float, theta: float, theta_dot: float, terminated: bool) -> float:
-    """Return 1 for a pole that stands, 0 for one that hangs: (1 + cos theta) / 2."""
-    return (1.0 + math.cos(theta)) / 2.0
-
-
-CONSTANT: Final[Mapping[Reward, float]] = {one_per_step: 1.0, minus_one_at_the_end: 0.0}
-"""Rewards that are the same number for every step that ends nothing, and that number: what need
-not be called in hot paths."""
+    x_limit: float | None
+    theta_limit: float | None
+    start_low: float | None
+    start_high: float | None
+    start_angle: float | None
+    reward: Reward | str | None
 
 
 @dataclass(frozen=True)
@@ -155,31 +143,129 @@ class Task:
         angle = [math.pi if self.turns else self.theta_limit * 2, np.inf]
         return np.array([self.x_limit * 2, np.inf, *angle * poles], dtype=np.float32)
 
-    def with_time_limit(self, steps: int | None) -> "Task":
-        """Return the same task with episodes of so many control steps; None leaves it as it is.
+    def with_changes(
+        self, *, max_episode_steps: int | None = None, **changes: Unpack[Changes]
+    ) -> "Task":
+        """Return the same task with other rules, or with episodes of so many control steps.
 
         At 1 per step as large a share of them counts as solved; of other rewards nothing is agreed.
 
-        >>> CARTPOLE_V1.with_time_limit(1_000).reward_threshold
+        >>> CARTPOLE_V1.with_changes(x_limit=1.2, max_episode_steps=1_000).reward_threshold
         950.0
 
-        Raises:
-            ConfigError: There are no such episodes.
-        """
-        if steps is None or steps == self.time_limit:
-            return self
-        if type(steps) is not int or not 1 <= steps <= MOST_STEPS:
-            raise ConfigError(
-                f"max_episode_steps must be a whole number from 1 to {MOST_STEPS:,}, not {steps!r}"
-            )
-        share = None
-        if self.reward is one_per_step and self.reward_threshold is not None:
-            share = self.reward_threshold / self.time_limit * steps
-        return dataclasses.replace(self, time_limit=steps, reward_threshold=share)
+        Args:
+            max_episode_steps: The time limit; None leaves it as it is, as everywhere here.
+            changes: By the names of the task's attributes; a reward also by its name in `REWARDS`.
 
-    def with_sutton_barto_reward(self) -> "Task":
-        """Return the same task with 0 per step and -1 at the end."""
-        return dataclasses.replace(self, reward=minus_one_at_the_end)
+        Raises:
+            ConfigError: A rule makes no sense, or no episode starts within the limits.
+        """
+        if unknown := [name for name in changes if name not in Changes.__annotations__]:
+            raise TypeError(f"got an unexpected keyword argument {unknown[0]!r}")
+        asked: dict[str, Any] = {**changes, "time_limit": max_episode_steps}
+        given: dict[str, Any] = {
+            name: _checked(name, asked[name]) for name in asked if asked[name] is not None
+        }
+        if all(getattr(self, name) == value for name, value in given.items()):
+            return self
+        low, high = (given.get(name, getattr(self, name)) for name in ("start_low", "start_high"))
+        if low > high:
+            raise ConfigError(
+                f"start_low ({low:g}) is above start_high ({high:g}); starts lie between"
+            )
+        changed = dataclasses.replace(self, **given)
+        changed._check_starts()
+        return dataclasses.replace(changed, reward_threshold=self._threshold_of(changed))
+
+    def _threshold_of(self, changed: "Task") -> float | None:
+        """What counts as solved by changed rules, as far as that is agreed."""
+        agreed = self.reward_threshold
+        if (changed.reward, changed.time_limit) == (self.reward, self.time_limit):
+            return agreed
+        if agreed is None or not changed.reward is self.reward is one_per_step:
+            return None
+        return agreed / self.time_limit * changed.time_limit
+
+    def _check_starts(self) -> None:
+        for name, middle in ("x", 0.0), ("theta", self.start_angle):
+            low, high = middle + self.start_low, middle + self.start_high
+            limit = getattr(self, f"{name}_limit")
+            if max(low, -high) > limit:
+                unit = "m" if name == "x" else "rad"
+                raise ConfigError(
+                    f"episodes start between {name} = {low:g} and {high:g} {unit}, all beyond "
+                    f"{name}_limit, {limit:g}: change start_low, start_high or start_angle, or "
+                    f"make {name}_limit larger (inf: none)"
+                )
+
+    @property
+    def changes(self) -> dict[str, object]:
+        """What `resolve` needs beside the name to make it again, but for the time limit."""
+        own, names = TASKS.get(self.name, self), Changes.__annotations__
+        differ = [name for name in names if getattr(self, name) != getattr(own, name)]
+        return {name: getattr(self, name) for name in differ}
+
+
+def number_of(name: str, value: SupportsFloat | str, unit: str, *, is_limit: bool = False) -> float:
+    """Return the number that a rule is.
+
+    Args:
+        name: What the rule is called.
+        value: What was given.
+        unit: What it counts.
+        is_limit: Whether it is more than 0, and may be infinite.
+
+    Raises:
+        ConfigError: It is none.
+    """
+    try:
+        number = math.nan if isinstance(value, bool | str) else float(value)
+    except (TypeError, ValueError, OverflowError):
+        number = math.nan
+    if (is_limit and number == math.inf) or (
+        -FARTHEST <= number <= FARTHEST and (number > 0 or not is_limit)
+    ):
+        # Without the sum, numpy calls 0.0 to -0.0 a range that runs backwards.
+        return number + 0.0
+    bounds = (
+        f"more than 0 and at most {FARTHEST:g}, or infinite"
+        if is_limit
+        else f"from {-FARTHEST:g} to {FARTHEST:g}"
+    )
+    raise ConfigError(f"{name} must be a number ({unit}) {bounds}, not {value!r}")
+
+
+_STATE: Final = "m, m/s, rad, rad/s"
+_UNITS: Final = {
+    "x_limit": "m",
+    "theta_limit": "rad",
+    "start_low": _STATE,
+    "start_high": _STATE,
+    "start_angle": "rad",
+}
+
+
+def _checked(name: str, value: Any) -> float | Reward:  # noqa: ANN401 - whatever was given
+    """A rule as a task has it, or ConfigError."""
+    if name == "time_limit":
+        if type(value) is int and 1 <= value <= MOST_STEPS:
+            return value
+        raise ConfigError(
+            f"max_episode_steps must be a whole number from 1 to {MOST_STEPS:,}, not {value!r}"
+        )
+    if name == "reward":
+        return _reward(value)
+    return number_of(name, value, _UNITS[name], is_limit=name.endswith("limit"))
+
+
+def _reward(value: Any) -> Reward:  # noqa: ANN401 - whatever was given
+    if callable(value):
+        return cast(Reward, value)
+    if not isinstance(value, str):
+        known = ", ".join(REWARDS)
+        raise ConfigError(f"reward must be one of {known} or a function, not {value!r}")
+    check_known("reward", value, REWARDS)
+    return REWARDS[value]
 
 
 CARTPOLE_V1: Final = Task("CartPole-v1", reward_threshold=475.0)
@@ -221,13 +307,16 @@ def task_named(name: str) -> Task:
     return TASKS[name]
 
 
-def resolve(task: Task | str) -> Task:
-    """Return a task that was given itself or by its name.
+def resolve(
+    task: Task | str, *, max_episode_steps: int | None = None, **changes: Unpack[Changes]
+) -> Task:
+    """Return a task that was given itself or by its name, with some rules changed.
 
     Raises:
-        ConfigError: There is none of that name.
+        ConfigError: There is none of that name, or a rule makes no sense; see `Task.with_changes`.
     """
-    return task if isinstance(task, Task) else task_named(task)
+    known = task if isinstance(task, Task) else task_named(task)
+    return known.with_changes(max_episode_steps=max_episode_steps, **changes)
 
 
 def control_of(push: Number, controls: Sequence[float] | npt.NDArray[np.float64]) -> Number:

@@ -310,3 +310,18 @@ def test_importing_it_is_quiet():
         check=True,
     )
     assert done.stderr == ""
+
+
+def test_changed_rules_are_those_of_the_environment():
+    rules = {"x_limit": 0.5, "theta_limit": 0.4, "start_angle": -0.1, "reward": "upright"}
+    env = dm.load(seed=5, discrete=True, **rules)
+    ours = gymnasium.make("mjcartpole/CartPole-v1", integrator="mujoco", **rules)
+    ours.reset(seed=5)
+    env.reset()
+    over = False
+    while not over:
+        step, (_, reward, over, _, _) = env.step(0), ours.step(0)
+        np.testing.assert_array_equal(env.physics.state, ours.unwrapped.state)
+        assert (step.reward, step.discount == 0.0) == (reward, over)
+    with pytest.raises(ConfigError, match="x_limit must be"):
+        dm.load(x_limit=-1)

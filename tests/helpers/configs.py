@@ -8,7 +8,8 @@ from hypothesis import strategies as st
 from mjcartpole import task
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.methods import METHODS
-from mjcartpole.task import Task, minus_one_at_the_end
+from mjcartpole.rewards import minus_one_at_the_end
+from mjcartpole.task import Task
 from nightly import at_night
 
 TASKS = {

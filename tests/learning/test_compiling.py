@@ -21,7 +21,7 @@ QUICK_TRAINING = """
     from mjcartpole.learning.training import train
     from mjcartpole.learning import kernels
     from mjcartpole.learning.methods import q_learning
-    from mjcartpole.task import one_per_step
+    from mjcartpole.rewards import one_per_step
     for seed in (0, 1):
         result = train(TrainConfig(backend="gym", episodes=4, seed=seed))
     stats = kernels.learn_chunk(q_learning, one_per_step).stats

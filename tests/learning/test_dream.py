@@ -9,7 +9,8 @@ import pytest
 from mjcartpole.envs.backend import make_env
 from mjcartpole.learning.dream import Dream, look
 from mjcartpole.learning.fitted import Linear, Rod
-from mjcartpole.task import CARTPOLE_V1, SWING_UP, minus_one_at_the_end
+from mjcartpole.rewards import minus_one_at_the_end
+from mjcartpole.task import CARTPOLE_V1, SWING_UP
 
 REFERENCE = Rod(10 / 1.1, 0.05 / 1.1, 14.7, 1.5, 0.0, 0.02)
 

@@ -27,7 +27,7 @@ from mjcartpole.learning.learner import Learner
 from mjcartpole.learning.methods import METHODS, action_values, n_step_sarsa, sarsa
 from mjcartpole.learning.methods.experience import Trajectory, Transition
 from mjcartpole.learning.stepping import compiled
-from mjcartpole.task import minus_one_at_the_end, one_per_step
+from mjcartpole.rewards import minus_one_at_the_end, one_per_step
 from nightly import examples, few
 
 quick = examples(200)
@@ -228,7 +228,7 @@ REWARDS = """
     from mjcartpole.learning import kernels
     from mjcartpole.learning.config import TrainConfig, config_class
     from mjcartpole.learning.methods import q_learning
-    from mjcartpole.task import one_per_step
+    from mjcartpole.rewards import one_per_step
     from mjcartpole.learning.training import train
     result = train(TrainConfig(backend="gym", episodes=9))
     print(mjcartpole.__file__, result.returns.sum() / result.steps)
@@ -263,7 +263,7 @@ def test_an_edit_of_the_rules_reaches_what_is_compiled(tmp_path):
     init = str(package / "__init__.py")
     assert run() == [init, "1.0", "0"]
     assert run() == [init, "1.0", "1"]
-    rules = (package / "task.py").read_text()
+    rules = (package / "rewards.py").read_text()
     assert "    return 1.0\n" in rules
-    (package / "task.py").write_text(rules.replace("    return 1.0\n", "    return 3.0\n"))
+    (package / "rewards.py").write_text(rules.replace("    return 1.0\n", "    return 3.0\n"))
     assert run() == [init, "3.0", "0"]

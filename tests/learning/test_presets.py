@@ -20,7 +20,7 @@ def test_a_preset_is_a_config_that_says_what_it_changes(name):
 @pytest.mark.parametrize("backend", ["mujoco", "gym"])
 def test_what_is_learned_from_episodes_of_ten_seconds_holds_for_half_an_hour(backend):
     config = TrainConfig.preset("endless", backend=backend, seed=3)
-    endless = config.rules.with_time_limit(100_000)
+    endless = config.rules.with_changes(max_episode_steps=100_000)
     played = evaluate(train(config).policy, backend=backend, task=endless, episodes=20)
     assert (played.returns == 100_000).sum() >= 19
 

@@ -83,7 +83,7 @@ def setups():
 
 def swing_ups():
     """A table on poles that turn right round, by both integrators."""
-    task = SWING_UP.with_time_limit(120)
+    task = SWING_UP.with_changes(max_episode_steps=120)
     for model, integrator in (("cartpole", "gym"), ("twopoles", "mujoco")):
         poles = load_model(model).poles
         high = (2.4, 3.0) + (math.pi, 9.0) * poles

@@ -43,7 +43,7 @@ def is_upright(x, x_dot, theta, theta_dot, terminated):
 
 def test_rules_that_reward_a_side_are_refused():
     check_symmetric(None, task=dataclasses.replace(CARTPOLE_V1, reward=is_upright))
-    check_symmetric(None, task=CARTPOLE_V1.with_sutton_barto_reward())
+    check_symmetric(None, task=CARTPOLE_V1.with_changes(reward="minus-one-at-the-end"))
     with pytest.raises(ConfigError, match=r"Leaning rewards x .* with .* and its mirror image"):
         check_symmetric(None, task=Task("Leaning", reward=leans))
 

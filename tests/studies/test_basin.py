@@ -65,7 +65,7 @@ def test_others_are_held_where_it_is_asked():
 def test_where_no_angle_ends_an_episode_the_table_says_how_far():
     assert limit_along(2, SWING_UP) is None
     assert limit_along(0, CARTPOLE_V1) == 2.4
-    setup = PolicySetup("leans", LEANS, "gym", task=SWING_UP.with_time_limit(20))
+    setup = PolicySetup("leans", LEANS, "gym", task=SWING_UP.with_changes(max_episode_steps=20))
     ((field,),) = basin(setup, points=3).fields
     assert field.edges[0].tolist() == pytest.approx([-0.2, -0.2 / 3, 0.2 / 3, 0.2])
     assert (field.values == 20).all()

@@ -1,7 +1,7 @@
 """Who does the physics: our MuJoCo cart-pole or gymnasium's CartPole-v1, behind one interface."""
 
 from collections.abc import Collection
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal, Unpack, get_args
 
 import gymnasium
 
@@ -9,7 +9,7 @@ from mjcartpole.envs.gym_task import GymTask
 from mjcartpole.envs.registration import ENV_ID, env_id
 from mjcartpole.errors import ConfigError, check_known
 from mjcartpole.integrator import Integrator, check_integrator
-from mjcartpole.task import CARTPOLE_V1, CONTINUOUS, Task, resolve
+from mjcartpole.task import CARTPOLE_V1, CONTINUOUS, Changes, Task, resolve
 
 if TYPE_CHECKING:
     from mjcartpole.physics.load import ModelLike
@@ -48,8 +48,11 @@ def make_env(
     model: "ModelLike" = "cartpole",
     integrator: Integrator = "gym",
     task: Task | str = CARTPOLE_V1,
+    *,
+    max_episode_steps: int | None = None,
+    **changes: Unpack[Changes],
 ) -> gymnasium.Env[Any, Any]:
-    """Make the environment of a backend, with the task's time limit.
+    """Make the environment of a backend, with the task's time limit, or with rules changed.
 
     Gymnasium's passive checker is left out: both environments pass it in the tests, and it costs
     more than the physics.
@@ -59,7 +62,7 @@ def make_env(
         ModelError: The model cannot be used.
     """
     check_backend(backend, model, integrator)
-    rules = resolve(task)
+    rules = resolve(task, max_episode_steps=max_episode_steps, **changes)
     if backend == "gym":
         env = gymnasium.make(GYM_ID, max_episode_steps=rules.time_limit, disable_env_checker=True)
         return env if rules is CARTPOLE_V1 else GymTask(env, rules)

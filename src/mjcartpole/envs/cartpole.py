@@ -2,20 +2,20 @@
 
 import copy
 from collections.abc import Callable
-from typing import Any, Self
+from typing import Any, Self, Unpack
 
 import gymnasium
 import numpy as np
 import numpy.typing as npt
 from gymnasium import logger
-from gymnasium.envs.registration import EnvSpec
 
 from mjcartpole.envs.actions import STEP_AFTER_END, action_space, invalid
 from mjcartpole.envs.editable import Editable
 from mjcartpole.envs.names import CartPoleNames, refuse_slip
-from mjcartpole.envs.options import reset_options, usual
+from mjcartpole.envs.observations import Observation, observed, observer
+from mjcartpole.envs.options import reset_options, rules_of, usual
 from mjcartpole.envs.pictures import InNotebooks, Pictures, RenderMode, warn_without_mode
-from mjcartpole.envs.spec import portable
+from mjcartpole.envs.spec import PortableSpec
 from mjcartpole.errors import ConfigError, ResetNeededError
 from mjcartpole.integrator import Integrator
 from mjcartpole.media.renderer import DEFAULT_HEIGHT, DEFAULT_WIDTH
@@ -24,12 +24,12 @@ from mjcartpole.physics.bodies import starting_state
 from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.load import Edits, ModelLike, load_shared
 from mjcartpole.physics.simulation import FARTHEST_SANE, Simulation, State, as_seen, check_sane
+from mjcartpole.rewards import CONSTANT
 from mjcartpole.task import (
     CARTPOLE_V1,
-    CONSTANT,
+    Changes,
     Task,
     frame_rate,
-    resolve,
 )
 
 # What `step` needs, as plain globals: the fewest look-ups and no sign to change.
@@ -45,7 +45,7 @@ _OWN = ("_simulation", "_pictures", "_model", "_steps_after_end")
 
 
 class CartPoleEnv(
-    InNotebooks, gymnasium.Env[npt.NDArray[np.float32], np.int64 | int], CartPoleNames
+    InNotebooks, PortableSpec, gymnasium.Env[npt.NDArray[np.float32], np.int64 | int], CartPoleNames
 ):
     """CartPole-v1, moved by MuJoCo.
 
@@ -124,7 +124,11 @@ class CartPoleEnv(
     | `own_timestep`        | bool                   | False       | One physics step of the file per action, instead of 0.02 s |
     | `integrator`          | "gym" or "mujoco"      | "gym"       | Explicit Euler as CartPole-v1, or the integrator that the file names |
     | `task`                | str, Task              | "CartPole-v1" | Other rules: limits, starting states, rewards; see `mjcartpole.Task` |
+    | `x_limit`, `theta_limit` | float               | the task's  | How far the cart (m) and a pole (rad) may go; `math.inf` for any distance, any angle |
+    | `start_low`, `start_high`, `start_angle` | float | the task's | Bounds of the starting state's values; where a pole starts (rad), to which they are added |
+    | `reward`              | str, function          | the task's  | "one-per-step", "minus-one-at-the-end", "upright", or one's own; see `mjcartpole.Task` |
     | `sutton_barto_reward` | bool                   | False       | See Rewards                   |
+    | `observation`         | "state" or "trig"      | "state"     | "trig": `x, x_dot`, and of each pole `cos theta, sin theta, theta_dot` |
     | `render_mode`         | None, "rgb_array", "human" | None    | Nothing, arrays, or a window (where there is a screen) |
     | `width`, `height`     | int                    | 640, 480    | Size of a picture, in pixels  |
     | `camera`              | str                    | "side"      | A camera of the model         |
@@ -146,8 +150,6 @@ class CartPoleEnv(
     * v1: the rules of CartPole-v1.
     """  # noqa: E501 - a table's rows cannot be wrapped
 
-    _spec: EnvSpec | None = None
-
     metadata: dict[str, Any] = {  # noqa: RUF012 - gymnasium's own declaration
         "render_modes": ["human", "rgb_array"],
         "render_fps": frame_rate(),
@@ -162,25 +164,27 @@ class CartPoleEnv(
         integrator: Integrator = "gym",
         task: Task | str = CARTPOLE_V1,
         sutton_barto_reward: bool = False,
+        observation: Observation = "state",
         render_mode: RenderMode | None = None,
         width: int = DEFAULT_WIDTH,
         height: int = DEFAULT_HEIGHT,
         camera: str = DEFAULT_CAMERA,
+        **rules: Unpack[Changes],
     ) -> None:
         """Load the model; nothing is drawn and no OpenGL is touched until `render`.
 
         Raises:
             ModelError: The model cannot be found, has an error, or is no cart-pole.
-            ConfigError: The integrator, the task or the render mode is unknown, or a window is to
-                have a size.
+            ConfigError: The integrator, the task, the observation or the render mode is unknown, a
+                rule makes no sense, or a window is to have a size.
             RenderError: The size of a picture makes no sense, or the model has no such camera.
         """
         cartpole = load_shared(model, edits, own_timestep=own_timestep)
         self._model = Editable(cartpole, integrator)
         # Made when it is first needed: it takes several times as long as all the rest.
         self._simulation: Simulation | None = None
-        rules = resolve(task)
-        self._task = rules.with_sutton_barto_reward() if sutton_barto_reward else rules
+        self._task = rules_of(task, rules, sutton_barto_reward=sutton_barto_reward)
+        self._observation = observation
         if self._task.continuous and type(self) is CartPoleEnv:
             raise ConfigError(f"{self._task.name} takes pushes; see ContinuousCartPoleEnv")
         self._usual = usual(self._task)
@@ -225,7 +229,9 @@ class CartPoleEnv(
         observation = np.zeros(4, dtype=np.float32)
         # A view that takes single floats several times faster than the array does.
         cells: memoryview[float] = observation.data.cast("B").cast("f")
-        observe = observation.copy if poles == 1 else simulation.observer(self._task)
+        observe: Callable[[], npt.NDArray[np.float32]] = observation.copy
+        if poles > 1 or self._observation != "state":
+            observe = observer(simulation, self._task, self._observation)
         self._at_hand = (*self._limits, cells, observe, CONSTANT.get(self._task.reward))
 
     def _set_limits(self, x: float, theta: float) -> None:
@@ -256,15 +262,6 @@ class CartPoleEnv(
         if not own and name not in gymnasium.Env.__annotations__:
             refuse_slip(name)
         super().__setattr__(name, value)
-
-    @property
-    def spec(self) -> EnvSpec | None:
-        """Gymnasium's specification; it says in JSON what makes the same environment again."""
-        return self._spec
-
-    @spec.setter
-    def spec(self, spec: EnvSpec | None) -> None:
-        self._spec = spec and portable(spec, self._model.base)
 
     @property
     def state(self) -> npt.NDArray[np.float64] | None:
@@ -368,7 +365,7 @@ class CartPoleEnv(
         self._steps_after_end[0] = None
         if self.render_mode == "human":
             self.render()
-        return self._task.seen(state).astype(np.float32), {}
+        return observed(state, self._task, self._observation), {}
 
     def render(self) -> npt.NDArray[np.uint8] | None:
         """Draw the current state.

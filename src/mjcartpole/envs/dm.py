@@ -8,11 +8,12 @@ import copy
 import math
 import operator
 import warnings
-from typing import Any, Final
+from typing import Any, Final, Unpack, get_args
 
 import numpy as np
 import numpy.typing as npt
 
+from mjcartpole.envs.observations import Observation, with_cosines
 from mjcartpole.errors import ConfigError, check_known
 from mjcartpole.physics.bodies import starting_state
 from mjcartpole.physics.cartpole import CartPole
@@ -22,6 +23,7 @@ from mjcartpole.task import (
     CONTROL_STEP,
     N_ACTIONS,
     TASKS,
+    Changes,
     Task,
     worst_pole,
 )
@@ -140,7 +142,8 @@ class Balance(control.Task):  # type: ignore[misc]
       lies outside counts as the nearer end. With `discrete`, it is CartPole-v1's own: 0 pushes to
       the left, 1 to the right.
     - Observation: an OrderedDict of `position`, `(x, theta)`, and `velocity`, `(x_dot, theta_dot)`,
-      each of shape (2,), float64; one more angle each for each further pole.
+      each of shape (2,), float64; one more angle each for each further pole. With `trig`, cosine
+      and sine are there in place of each angle: `(x, cos theta, sin theta)`, as in dm_control's.
     - Reward 1 for every step, the last one included. Discount 0 where a pole leans more than 12
       degrees or the cart is more than 2.4 m from the middle, 1 elsewhere, the time limit included.
     - Each of the state's values starts uniformly within ±0.05. A seed gives the starting
@@ -158,6 +161,7 @@ class Balance(control.Task):  # type: ignore[misc]
         limit: float,
         discrete: bool,
         rules: Task = CARTPOLE_V1,
+        observation: Observation = "state",
     ) -> None:
         """Take what decides an episode.
 
@@ -167,6 +171,10 @@ class Balance(control.Task):  # type: ignore[misc]
             limit: Control steps until an episode is cut off.
             discrete: Whether actions are 0 and 1, instead of controls.
             rules: Limits, starting states and rewards.
+            observation: Whether angles are observed themselves, or by cosine and sine.
+
+        Raises:
+            ConfigError: There is no such observation.
         """
         # Programs made for dm_control's suite put another one in its place, under this name.
         self._random = (
@@ -177,6 +185,8 @@ class Balance(control.Task):  # type: ignore[misc]
         self._limit = limit
         self._rules, self._middle = rules, starting_state(cartpole, rules)
         self._discrete = discrete
+        check_known("observation", observation, get_args(Observation))
+        self._is_trig = observation == "trig"
         self._visualize_reward = False
 
     @property
@@ -228,6 +238,10 @@ class Balance(control.Task):  # type: ignore[misc]
         self, physics: Physics
     ) -> "collections.OrderedDict[str, npt.NDArray[np.float64]]":
         """The state, positions and velocities apart."""
+        if self._is_trig:
+            both = with_cosines(physics.state)
+            position = np.delete(both, np.s_[1::3])
+            return collections.OrderedDict(position=position, velocity=both[1::3])
         state = self._rules.seen(physics.state)
         return collections.OrderedDict(position=state[0::2], velocity=state[1::2])
 
@@ -270,6 +284,8 @@ def load(
     time_limit: float | None = None,
     environment_kwargs: dict[str, Any] | None = None,
     visualize_reward: bool = False,
+    observation: Observation = "state",
+    **rules: Unpack[Changes],
 ) -> control.Environment:
     """Make CartPole-v1 as a dm_control environment; see `Balance` for its rules.
 
@@ -293,6 +309,9 @@ def load(
             for never.
         environment_kwargs: More for dm_control's `Environment`, such as `flat_observation`.
         visualize_reward: Colour the poles by the reward, in pictures.
+        observation: `trig` for cosine and sine in place of each angle.
+        rules: Those that are other than the task's: `x_limit`, `theta_limit`, `start_low`,
+            `start_high`, `start_angle`, `reward`; see `mjcartpole.Task`.
 
     Raises:
         ConfigError: There is no such task, or a setting makes no sense.
@@ -300,9 +319,9 @@ def load(
     """
     known = {BALANCE: CARTPOLE_V1, **TASKS}
     check_known("task", task_name, known)
-    rules = known[task_name]
+    task = known[task_name].with_changes(**rules)
     if time_limit is None:
-        time_limit = rules.time_limit * CONTROL_STEP
+        time_limit = task.time_limit * CONTROL_STEP
     if not time_limit > 0:
         raise ConfigError(f"time_limit must be more than 0 seconds, not {time_limit}")
     if seed is not None and seed < 0:
@@ -311,7 +330,14 @@ def load(
     limit = time_limit
     if not math.isinf(time_limit):
         limit = max(1, round(time_limit / cartpole.control_step))
-    balance = Balance(cartpole, random=seed, limit=limit, discrete=discrete, rules=rules)
+    balance = Balance(
+        cartpole,
+        random=seed,
+        limit=limit,
+        discrete=discrete,
+        rules=task,
+        observation=observation,
+    )
     balance.visualize_reward = visualize_reward
     # Without dm_control's half steps, a step is one call of mj_step, whatever the solver.
     settings = {"legacy_step": False, **(environment_kwargs or {})}

@@ -2,7 +2,6 @@
 
 import dataclasses
 import difflib
-import math
 from collections.abc import Callable, Mapping
 from typing import Any, Final
 
@@ -10,14 +9,15 @@ import numpy as np
 from gymnasium import logger, spaces
 
 from mjcartpole.envs.editable import Editable
+from mjcartpole.envs.observations import Observation, observation_space
 from mjcartpole.errors import ConfigError, MjCartPoleError, SettingError
 from mjcartpole.physics.bodies import cart_bodies, mass_of, pole_bodies
 from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.edit.rescale import length_of
 from mjcartpole.physics.parameters import forces_of, pole_of
-from mjcartpole.physics.simulation import LARGEST_SANE, Simulation
+from mjcartpole.physics.simulation import Simulation
 from mjcartpole.physics.structure import directions
-from mjcartpole.task import Task, in_words
+from mjcartpole.task import Task, in_words, number_of
 
 Numbers = float | tuple[float, ...]
 """A number, or one for each of several poles."""
@@ -137,20 +137,6 @@ def _force(cartpole: CartPole) -> float:
     return abs(right)
 
 
-def _limit(name: str, limit: float) -> float:
-    """A limit as a number; infinity is none."""
-    try:
-        number = float(limit)
-    except (TypeError, ValueError, OverflowError):
-        number = math.nan
-    if 0 < number <= LARGEST_SANE or number == math.inf:
-        return number
-    raise ConfigError(
-        f"{name} must be a number more than 0 and at most {LARGEST_SANE:g}, or infinite, "
-        f"not {limit!r}"
-    )
-
-
 class CartPoleNames:
     """Reading says what the model has; setting edits its document and compiles it.
 
@@ -160,6 +146,7 @@ class CartPoleNames:
 
     observation_space: spaces.Space[Any]
     _task: Task
+    _observation: Observation
     _model: Editable
     _simulation: Simulation | None
     _limits: tuple[float, float, float, float]
@@ -213,7 +200,7 @@ class CartPoleNames:
 
     @x_threshold.setter
     def x_threshold(self, limit: float) -> None:
-        self._set_limits(_limit("x_threshold", limit), self._limits[3])
+        self._set_limits(number_of("x_threshold", limit, "m", is_limit=True), self._limits[3])
 
     @property
     def theta_threshold_radians(self) -> float:
@@ -222,7 +209,8 @@ class CartPoleNames:
 
     @theta_threshold_radians.setter
     def theta_threshold_radians(self, limit: float) -> None:
-        self._set_limits(self._limits[1], _limit("theta_threshold_radians", limit))
+        angle = number_of("theta_threshold_radians", limit, "rad", is_limit=True)
+        self._set_limits(self._limits[1], angle)
 
     def _set_limits(self, x: float, theta: float) -> None:
         self._limits = -x, x, -theta, theta
@@ -230,8 +218,8 @@ class CartPoleNames:
         task = self._task
         farthest = max(x, task.x_limit), max(theta, task.theta_limit)
         rules = dataclasses.replace(task, x_limit=farthest[0], theta_limit=farthest[1])
-        bound = rules.observation_bound(self._model.base.poles)
-        self.observation_space = spaces.Box(-bound, bound, dtype=np.float32)
+        poles = self._model.base.poles
+        self.observation_space = observation_space(rules, poles, self._observation)
 
     @property
     def task(self) -> Task:

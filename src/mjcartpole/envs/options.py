@@ -1,4 +1,4 @@
-"""What `reset(options=…)` takes."""
+"""What environments take: rules where they are made, `reset(options=…)` later."""
 
 import math
 from collections.abc import Mapping
@@ -7,7 +7,8 @@ from typing import Any, NamedTuple, SupportsFloat
 from gymnasium.envs.classic_control.utils import maybe_parse_reset_bounds
 
 from mjcartpole.errors import ConfigError
-from mjcartpole.task import CARTPOLE_V1, Task
+from mjcartpole.rewards import minus_one_at_the_end
+from mjcartpole.task import CARTPOLE_V1, Changes, Task, resolve
 
 
 class ResetOptions(NamedTuple):
@@ -22,6 +23,33 @@ class ResetOptions(NamedTuple):
     low: float = CARTPOLE_V1.start_low
     high: float = CARTPOLE_V1.start_high
     edits: Any = ()
+
+
+def rules_of(task: Task | str, changes: Changes, *, sutton_barto_reward: bool) -> Task:
+    """Return an environment's rules.
+
+    Args:
+        task: What they are, but for the changes.
+        changes: Those that are other ones.
+        sutton_barto_reward: Whether the reward is -1 at the end, whatever else it was.
+
+    Raises:
+        ConfigError: They make no sense, or name two rewards.
+        TypeError: A change is none of a rule.
+    """
+    if "max_episode_steps" in changes:
+        raise TypeError(
+            "got an unexpected keyword argument 'max_episode_steps'; gymnasium.make takes it, and "
+            "adds the time limit"
+        )
+    rules = resolve(task).with_changes(**changes)
+    if not sutton_barto_reward:
+        return rules
+    if changes.get("reward") is not None:
+        raise ConfigError(
+            "sutton_barto_reward=True is reward='minus-one-at-the-end'; leave out one of the two"
+        )
+    return rules.with_changes(reward=minus_one_at_the_end)
 
 
 def usual(task: Task) -> ResetOptions:

@@ -8,9 +8,27 @@ from typing import Any
 from gymnasium import logger
 from gymnasium.envs.registration import EnvSpec
 
+from mjcartpole.envs.editable import Editable
 from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.load import is_its_document
+from mjcartpole.rewards import REWARDS
 from mjcartpole.task import Task
+
+
+class PortableSpec:
+    """Has gymnasium's specification of an environment, in plain values."""
+
+    _model: Editable
+    _spec: EnvSpec | None = None
+
+    @property
+    def spec(self) -> EnvSpec | None:
+        """Gymnasium's specification; it says in JSON what makes the same environment again."""
+        return self._spec
+
+    @spec.setter
+    def spec(self, spec: EnvSpec | None) -> None:
+        self._spec = spec and portable(spec, self._model.base)
 
 
 def portable(spec: EnvSpec, cartpole: CartPole) -> EnvSpec:
@@ -22,7 +40,12 @@ def portable(spec: EnvSpec, cartpole: CartPole) -> EnvSpec:
         spec: As gymnasium makes it.
         cartpole: What the environment made of the arguments.
     """
-    arguments = {name: _plain(value) for name, value in spec.kwargs.items()}
+    task = spec.kwargs.get("task")
+    changes = task.changes if isinstance(task, Task) else {}
+    arguments = {name: _plain(value) for name, value in {**changes, **spec.kwargs}.items()}
+    for name, reward in REWARDS.items():
+        if arguments.get("reward") is reward:
+            arguments["reward"] = name
     if not isinstance(arguments.get("model", ""), str):
         arguments["model"] = cartpole.xml
         arguments.pop("edits", None)

@@ -2,17 +2,18 @@
 
 import copy
 import functools
-from typing import Any, Final, Literal, get_args
+from typing import Any, Final, Literal, Unpack, get_args
 
 import numpy as np
 import numpy.typing as npt
-from gymnasium import logger, spaces
+from gymnasium import logger
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from mjcartpole.envs.actions import action_space, controls_of_choices, controls_of_pushes
 from mjcartpole.envs.names import FixedNames
-from mjcartpole.envs.options import start_bounds
+from mjcartpole.envs.observations import Observation, observation_space, observed
+from mjcartpole.envs.options import rules_of, start_bounds
 from mjcartpole.envs.registration import ENV_ID
 from mjcartpole.errors import ConfigError, ResetNeededError
 from mjcartpole.integrator import Integrator
@@ -21,12 +22,12 @@ from mjcartpole.media.scene import DEFAULT_CAMERA, check_picture
 from mjcartpole.physics.batch_simulation import BatchSimulation
 from mjcartpole.physics.bodies import starting_state
 from mjcartpole.physics.load import Edits, ModelLike, load_model
+from mjcartpole.rewards import CONSTANT
 from mjcartpole.task import (
     CARTPOLE_V1,
-    CONSTANT,
+    Changes,
     Task,
     frame_rate,
-    resolve,
     state_names,
     worst_pole,
 )
@@ -93,7 +94,9 @@ class CartPoleVectorEnv(
     | `own_timestep`        | bool                   | False       | One physics step of the file per action, instead of 0.02 s |
     | `integrator`          | "gym" or "mujoco"      | "gym"       | As in `CartPoleEnv`           |
     | `task`                | str, Task              | "CartPole-v1" | As in `CartPoleEnv`         |
+    | `x_limit`, `theta_limit`, `start_low`, `start_high`, `start_angle`, `reward` | | the task's | As in `CartPoleEnv` |
     | `sutton_barto_reward` | bool                   | False       | 0 per step and -1 at termination, instead of 1 per step |
+    | `observation`         | "state" or "trig"      | "state"     | As in `CartPoleEnv`           |
     | `threads`             | int or None            | None        | Threads that step; None: as many as pay, which the time decides |
     | `render_mode`         | None, "rgb_array", "rgb_array_list" | None | Nothing, or one picture per environment (the two are the same, as in gymnasium's vector) |
     | `width`, `height`     | int                    | 640, 480    | Size of a picture, in pixels  |
@@ -130,24 +133,27 @@ class CartPoleVectorEnv(
         integrator: Integrator = "gym",
         task: Task | str = CARTPOLE_V1,
         sutton_barto_reward: bool = False,
+        observation: Observation = "state",
         threads: int | None = None,
         render_mode: VectorRenderMode | None = None,
         width: int = DEFAULT_WIDTH,
         height: int = DEFAULT_HEIGHT,
         camera: str = DEFAULT_CAMERA,
+        **rules: Unpack[Changes],
     ) -> None:
         """Load the model; nothing is drawn and no OpenGL is touched until `render`.
 
         Raises:
             ModelError: The model cannot be found, has an error, or is no cart-pole.
-            ConfigError: The integrator, the task or the render mode is unknown, or `num_envs`,
-                `max_episode_steps` or `threads` is no whole number from 1.
+            ConfigError: The integrator, the task, the observation or the render mode is unknown, a
+                rule makes no sense, or `num_envs`, `max_episode_steps` or `threads` is no whole
+                number from 1.
             RenderError: The size of a picture makes no sense, or the model has no such camera.
         """
         self.num_envs = _count("num_envs", num_envs)
-        rules = resolve(task)
-        self._task = rules.with_sutton_barto_reward() if sutton_barto_reward else rules
-        steps = rules.time_limit if max_episode_steps is None else max_episode_steps
+        self._task = rules_of(task, rules, sutton_barto_reward=sutton_barto_reward)
+        self._observation = observation
+        steps = self._task.time_limit if max_episode_steps is None else max_episode_steps
         self.max_episode_steps = _count("max_episode_steps", steps)
         threads = None if threads is None else _count("threads", threads)
         _check_render_mode(render_mode)
@@ -157,8 +163,9 @@ class CartPoleVectorEnv(
         if render_mode is not None or (width, height, camera) != _DEFAULT_PICTURE:
             check_picture(self.cartpole, width, height, camera)
         self.metadata = self.metadata | {"render_fps": frame_rate(self.cartpole.control_step)}
-        bound = self._task.observation_bound(self.cartpole.poles)
-        self.single_observation_space = spaces.Box(-bound, bound, dtype=np.float32)
+        self.single_observation_space = observation_space(
+            self._task, self.cartpole.poles, observation
+        )
         self.single_action_space = action_space(self._task)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
@@ -242,7 +249,7 @@ class CartPoleVectorEnv(
         self._has_state = True
         self._deadlines[who] = self._clock + self.max_episode_steps
         self._ended = np.setdiff1d(self._ended, who, assume_unique=True)
-        return self._task.seen(self._simulation.state).astype(np.float32), {}
+        return observed(self._simulation.state, self._task, self._observation), {}
 
     def _mask(self, mask: object) -> npt.NDArray[np.intp]:
         """Indices of the environments that a reset is for."""
@@ -304,7 +311,7 @@ class CartPoleVectorEnv(
             terminations[restarted] = False
         self._ended = np.logical_or(terminations, truncations).nonzero()[0]
         return (
-            self._task.seen(self._simulation.state).astype(np.float32),
+            observed(self._simulation.state, self._task, self._observation),
             rewards,
             terminations,
             truncations,

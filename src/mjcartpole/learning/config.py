@@ -24,7 +24,6 @@ from mjcartpole.task import (
     in_words,
     resolve,
     state_names,
-    task_named,
 )
 
 if TYPE_CHECKING:
@@ -178,7 +177,7 @@ class TrainConfig:
         Raises:
             ConfigError: There is none of that name, or none of that length.
         """
-        return task_named(self.task).with_time_limit(self.max_episode_steps)
+        return resolve(self.task, max_episode_steps=self.max_episode_steps)
 
     def load_model(self) -> "CartPole":
         """Load the model that the config names; for backend gym the reference, as it is drawn.

@@ -45,6 +45,7 @@ from mjcartpole.learning.stepping import (
 )
 from mjcartpole.physics import cartpole_v1
 from mjcartpole.physics.simulation import LARGEST_SANE
+from mjcartpole.rewards import CONSTANT, Reward
 
 DIVERGED: Final = -1
 """In place of an ending."""
@@ -86,7 +87,7 @@ def _learn_episode(
     act: Callable[..., int],
     after_step: Callable[..., None],
     after_episode: Callable[..., None],
-    reward: task.Reward,
+    reward: Reward,
     physics: Physics,
     rules: Rules,
     grid: Grid,
@@ -130,7 +131,7 @@ def _learn_episode(
 
 @compiled
 def _play_episode(
-    reward: task.Reward,
+    reward: Reward,
     physics: Physics,
     rules: Rules,
     grid: Grid,
@@ -179,7 +180,7 @@ def uncached(entry: Callable[..., int]) -> Callable[..., int]:
 
 
 @functools.cache
-def learn_chunk(method: Any, reward: task.Reward) -> Callable[..., int]:
+def learn_chunk(method: Any, reward: Reward) -> Callable[..., int]:
     """Return the compiled loop that learns by a method, where this is the reward of a step."""
     functions = (method.begin_episode, method.act, method.after_step, method.after_episode)
     begin_episode, act, after_step, after_episode = map(_compilable, functions)
@@ -238,7 +239,7 @@ def learn_chunk(method: Any, reward: task.Reward) -> Callable[..., int]:
 
 
 @functools.cache
-def play_chunk(reward: task.Reward) -> Callable[..., int]:
+def play_chunk(reward: Reward) -> Callable[..., int]:
     """Return the compiled loop that plays, where this is the reward of a step."""
     _compilable(reward)
     sources = _sources(reward)
@@ -308,9 +309,9 @@ _greedy, _home = compiled(_compilable(tiles.greedy)), compiled(tiles.home)
 
 
 @functools.cache
-def why_not_compilable(reward: task.Reward) -> str:
+def why_not_compilable(reward: Reward) -> str:
     """Return why compiled code cannot call a reward; nothing if it can."""
-    if reward in task.CONSTANT:
+    if reward in CONSTANT:
         return ""
     if not isinstance(reward, FunctionType):
         return "is no plain function"

@@ -24,6 +24,7 @@ from mjcartpole import task
 from mjcartpole.learning import fitted
 from mjcartpole.physics import cartpole_v1
 from mjcartpole.physics.simulation import FARTHEST_SANE, LARGEST_SANE
+from mjcartpole.rewards import Reward
 
 Floats = npt.NDArray[np.float64]
 F = TypeVar("F", bound=Callable[..., Any])
@@ -311,7 +312,7 @@ def observe(physics: AnyPhysics, rules: Rules, state: State) -> Any:
 
 
 @compiled
-def pay(reward: task.Reward, rules: Rules, state: State, terminated: bool) -> float:
+def pay(reward: Reward, rules: Rules, state: State, terminated: bool) -> float:
     """Return the reward of a step."""
     theta = _wrapped(state[2]) if rules.turns else state[2]
     return reward(state[0], state[1], theta, state[3], terminated)

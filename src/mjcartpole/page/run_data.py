@@ -75,7 +75,7 @@ def run_data(setup: PolicySetup, told: Told, backend: str) -> dict[str, Any]:
 def _recorded(setup: PolicySetup) -> PolicySetup:
     """Return where an episode is played that the page is to play again: no longer than most are."""
     most = min(setup.task.time_limit, CARTPOLE_V1.time_limit)
-    return dataclasses.replace(setup, task=setup.task.with_time_limit(most))
+    return dataclasses.replace(setup, task=setup.task.with_changes(max_episode_steps=most))
 
 
 def packed(numbers: npt.NDArray[np.float64]) -> str:

@@ -98,10 +98,6 @@ class Simulation:
         for place, joint in self._places:
             self._qpos[joint], self._qvel[joint] = state[place], state[place + 1]
 
-    def observer(self, rules: task.Task) -> Callable[[], npt.NDArray[np.float32]]:
-        """Return what observes the state by the rules of a task, shape (size,)."""
-        return lambda: rules.seen(self.state).astype(np.float32)
-
     def steps(self, states: Vector, controls: Vector) -> Vector:
         """Return the states after one control step from each of many.
 

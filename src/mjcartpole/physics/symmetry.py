@@ -13,7 +13,8 @@ from mjcartpole.errors import ConfigError
 from mjcartpole.integrator import Integrator
 from mjcartpole.physics.cartpole import CartPole, Vector
 from mjcartpole.physics.simulation import Simulation
-from mjcartpole.task import CARTPOLE_V1, CONSTANT, Task, state_names, worst_pole
+from mjcartpole.rewards import CONSTANT
+from mjcartpole.task import CARTPOLE_V1, Task, state_names, worst_pole
 
 SAMPLES: Final = 64
 

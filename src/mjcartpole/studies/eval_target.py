@@ -5,7 +5,7 @@ from pathlib import Path
 
 from mjcartpole.envs.backend import Backend
 from mjcartpole.integrator import Integrator
-from mjcartpole.task import Task, task_named
+from mjcartpole.task import Task, resolve
 
 
 @dataclass(frozen=True)
@@ -40,5 +40,4 @@ class EvalTarget:
         Raises:
             ConfigError: There is no such task, or there are no such episodes.
         """
-        named = task_named(self.task) if self.task else otherwise
-        return named.with_time_limit(self.max_episode_steps)
+        return resolve(self.task or otherwise, max_episode_steps=self.max_episode_steps)

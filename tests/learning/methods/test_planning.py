@@ -16,7 +16,8 @@ from mjcartpole.learning.discretizer import Discretizer
 from mjcartpole.learning.methods.action_values import QTable
 from mjcartpole.learning.methods.planning import around, nodes_of, plan
 from mjcartpole.learning.training import Training, train
-from mjcartpole.task import TASKS, minus_one_at_the_end, register
+from mjcartpole.rewards import minus_one_at_the_end
+from mjcartpole.task import TASKS, register
 
 SMALL = {
     "method": "planning",
@@ -128,7 +129,7 @@ def test_it_balances_from_the_first_episode_on(backend):
 
 
 def test_the_rewards_are_those_of_the_task():
-    rules = TrainConfig().rules.with_sutton_barto_reward()
+    rules = TrainConfig().rules.with_changes(reward=minus_one_at_the_end)
     assert rules.reward is minus_one_at_the_end
     register(dataclasses.replace(rules, name="Planned-v0"))
     try:
