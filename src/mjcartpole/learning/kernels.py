@@ -20,7 +20,7 @@ import numpy.typing as npt
 from numba import types
 from numba.extending import register_jitable
 
-from mjcartpole import task
+from mjcartpole import rewards, task
 from mjcartpole.learning import discretizer, episodes, fitted, stepping, tiles
 from mjcartpole.learning.discretizer import Grid
 from mjcartpole.learning.episodes import Columns
@@ -354,6 +354,7 @@ _SHARED: Final = (
     episodes,
     fitted,
     stepping,
+    rewards,
     task,
     tiles,
     experience,
