@@ -42,7 +42,8 @@ def _exit_code(argv: list[str]) -> int:
     except SystemExit as stop:  # After --help.
         return int(stop.code or 0)
     except MjCartPoleError as error:
-        _complain(f"error: {error}")
+        for line in str(error).split("\n"):
+            _complain(f"error: {line}")
         return FAILED
     except KeyboardInterrupt as interrupt:
         _complain(str(interrupt) or "interrupted")

@@ -1,6 +1,9 @@
 """Progress bars on stderr: on terminals only, and gone when the work is done."""
 
 import sys
+import time
+from collections.abc import Iterable
+from typing import Final
 
 from rich.console import Console
 from rich.progress import (
@@ -21,6 +24,8 @@ from mjcartpole.studies.multi_seed import SeedRunner
 
 RUNNING_MEAN = 100
 """Episodes in the progress bar's mean."""
+REPORT_EVERY: Final = 60.0
+"""Seconds between two lines where there is no terminal for a bar: a cluster's log, for instance."""
 
 
 class _Doing(ProgressColumn):
@@ -67,3 +72,21 @@ def train_seeds(runner: SeedRunner, signals: StopSignals) -> None:
         bar = progress.add_task("", total=len(runner.seeds))
         for found in runner.run(signals.stop):
             progress.update(bar, advance=0 if found is None else 1)
+
+
+def study_runs(found: Iterable[object], total: int) -> None:
+    """Follow the runs of a study to the end; None among them is no run."""
+    columns = (_Doing(), BarColumn(), MofNCompleteColumn(), TextColumn("runs"))
+    done, started = 0, time.monotonic()
+    said = started
+    with progress_bar(*columns, TimeRemainingColumn()) as progress:
+        bar = progress.add_task("", total=total)
+        for record in found:
+            done += record is not None
+            progress.update(bar, completed=done)
+            now = time.monotonic()
+            if progress.disable and done and now - said > REPORT_EVERY:
+                said, left = now, (now - started) / done * (total - done)
+                print(
+                    f"{done:,} of {total:,} runs, {left:,.0f} s left", file=sys.stderr, flush=True
+                )

@@ -15,6 +15,7 @@ from mjcartpole.commands.page import Page
 from mjcartpole.commands.parity import Parity
 from mjcartpole.commands.plot import Plot
 from mjcartpole.commands.render import Render
+from mjcartpole.commands.study import Study
 from mjcartpole.commands.train import Train
 from mjcartpole.commands.transfer import Transfer
 from mjcartpole.commands.watch import Watch
@@ -29,6 +30,7 @@ COMMANDS: Final[list[type[Command]]] = [
     Model,
     Transfer,
     Plot,
+    Study,
     Watch,
 ]
 

@@ -88,22 +88,23 @@ def checked(values: Any, fields: Fields) -> dict[str, Any]:
             raise ValueError(f"{reprlib.repr(name)} is unknown; known are {', '.join(kinds)}")
         if isinstance(kinds[name], Mapping):
             checked(value, kinds[name])
-        elif not _fits(value, kinds[name]):
+        elif not fits(value, kinds[name]):
             raise ValueError(f"{name} cannot be {reprlib.repr(value)}")
     if missing := [name for name in fields if name[-1] != "?" and name not in values]:
         raise ValueError(f"{', '.join(missing)} is missing")
     return values
 
 
-def _fits(value: object, kind: Kind) -> bool:
+def fits(value: object, kind: Kind) -> bool:
+    """Return whether a value is of a kind; a list stands for a tuple."""
     origin: Any = get_origin(kind)
     inner = get_args(kind)
     if origin is Literal:
         return type(value) is str and value in inner
     if origin is tuple:
-        return type(value) is list and all(_fits(each, inner[0]) for each in value)
+        return type(value) is list and all(fits(each, inner[0]) for each in value)
     if origin in {Union, UnionType}:
-        return any(_fits(value, each) for each in inner)
+        return any(fits(value, each) for each in inner)
     if kind is str and type(value) is str and len(value) <= MOST_CHARACTERS:
         # Names of files may hold bytes that are no text; a line break is another matter.
         return value.encode("utf-8", "ignore").decode("utf-8").isprintable()

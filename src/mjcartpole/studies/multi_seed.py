@@ -1,18 +1,12 @@
 """Many seeds of one config, side by side: each as if it were trained alone."""
 
-import concurrent.futures
 import contextlib
 import dataclasses
-import multiprocessing
-import os
-import signal
-import sys
-import threading
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Future
+from collections.abc import Iterator, Sequence
+from concurrent.futures import BrokenExecutor, Future
 from dataclasses import dataclass
-from multiprocessing.synchronize import Event
 from pathlib import Path
+from typing import Final
 
 from mjcartpole.cores import worker_count
 from mjcartpole.errors import MjCartPoleError, RunError
@@ -30,27 +24,32 @@ from mjcartpole.physics.load import load_model, load_named
 from mjcartpole.studies import multi_seed_runs
 from mjcartpole.studies.finish_training import finish_training
 from mjcartpole.studies.seeds import ManyResult, SeedResult, check_seeds, seed_folder
+from mjcartpole.studies.side_by_side import Stop, side_by_side
+
+OUT_OF_MEMORY: Final = "out of memory"
 
 
 @dataclass(frozen=True)
-class _Job:
+class SeedJob:
     """One seed's training, in a form that another process can be given.
 
     Attributes:
         document: The model's, where it is loaded already.
         folder: The run's; None keeps nothing.
+        evaluated: Whether greedy episodes are played when it is over; always where it is kept.
     """
 
     config: TrainConfig
     engine: Engine
     document: str | None
-    folder: Path | None
-    preset: str
-    every: float
-    events: bool
-    allow_assets: tuple[Path, ...]
+    folder: Path | None = None
+    preset: str = "custom"
+    every: float = CHECKPOINT_EVERY
+    events: bool = False
+    allow_assets: tuple[Path, ...] = ()
+    evaluated: bool = True
 
-    def of(self, seed: int) -> "_Job":
+    def of(self, seed: int) -> "SeedJob":
         """Return the same with another seed, in that one's folder of many."""
         folder = None if self.folder is None else seed_folder(self.folder, seed)
         return dataclasses.replace(
@@ -102,53 +101,28 @@ class SeedRunner:
         on_mujoco = config.backend == "mujoco"
         engine = choose_engine(engine, config.backend, cartpole if on_mujoco else None)
         document = cartpole.xml if on_mujoco else None
-        self._job = _Job(config, engine, document, folder, preset, every, events, allow_assets)
+        self._job = SeedJob(config, engine, document, folder, preset, every, events, allow_assets)
         self._found: dict[int, SeedResult] = {}
 
-    def run(self, stop: Callable[[], bool]) -> Iterator[SeedResult | None]:
+    def run(self, stop: Stop) -> Iterator[SeedResult | None]:
         """Train all seeds, or until `stop()` is true.
 
         Yields:
             Each seed's result when it has come, and None now and then while waiting.
         """
+        jobs = (self._job.of(seed) for seed in self.seeds)
         # The compiled engine leaves Python's lock alone.
-        in_threads = self._job.engine == "compiled"
-        for found in (self._in_threads if in_threads else self._in_processes)(stop):
-            if found is not None:
-                self._found[found.seed] = found
-            yield found
+        threads = self._job.engine == "compiled"
+        for found in side_by_side(train_seed, jobs, self.workers, stop, threads=threads):
+            result = None if found is None else _result_of(found[1], found[0].config.seed)
+            if result is not None:
+                self._found[result.seed] = result
+            yield result
 
     def result(self) -> ManyResult:
         """Return the seeds that have come to something, in order."""
         found = tuple(self._found[seed] for seed in self.seeds if seed in self._found)
         return ManyResult(self._job.config, found)
-
-    def _in_threads(self, stop: Callable[[], bool]) -> Iterator[SeedResult | None]:
-        with concurrent.futures.ThreadPoolExecutor(self.workers) as pool:
-            yield from _as_they_come(
-                {pool.submit(_train_seed, self._job.of(seed), stop): seed for seed in self.seeds}
-            )
-
-    def _in_processes(self, stop: Callable[[], bool]) -> Iterator[SeedResult | None]:
-        # A fresh interpreter each: nothing of OpenGL or threads is inherited.
-        spawn = multiprocessing.get_context("spawn")
-        with _signals_for_parent():
-            stopped = spawn.Event()
-        with concurrent.futures.ProcessPoolExecutor(
-            self.workers, mp_context=spawn, initializer=_begin_worker, initargs=(stopped,)
-        ) as pool:
-            with _signals_for_parent():
-                futures = {
-                    pool.submit(_train_seed_in_worker, self._job.of(seed)): seed
-                    for seed in self.seeds
-                }
-            try:
-                for found in _as_they_come(futures):
-                    if stop():
-                        stopped.set()
-                    yield found
-            finally:
-                stopped.set()
 
 
 def train_many(
@@ -204,99 +178,54 @@ def _finished(runner: SeedRunner) -> ManyResult:
     return runner.result()
 
 
-def _as_they_come(futures: dict[Future[SeedResult], int]) -> Iterator[SeedResult | None]:
-    waiting = set(futures)
-    while waiting:
-        done, waiting = concurrent.futures.wait(
-            waiting, timeout=0.1, return_when=concurrent.futures.FIRST_COMPLETED
-        )
-        yield from (_result_of(future, futures[future]) for future in done)
-        yield None
-
-
 def _result_of(future: Future[SeedResult], seed: int) -> SeedResult:
     try:
         return future.result()
-    except (concurrent.futures.BrokenExecutor, OSError) as error:
+    except (BrokenExecutor, OSError) as error:
         # A worker process was killed from outside, or there is no memory for one.
         return SeedResult(seed, error=f"its process ended: {error}")
 
 
-@contextlib.contextmanager
-def _signals_for_parent() -> Iterator[None]:
-    """Have processes that are started inside never see signals that end a job.
-
-    A terminal, and `timeout`, send them to all processes of a job.
-    """
-    if sys.platform == "win32":
-        yield
-        return
-    ending = {signal.SIGINT, signal.SIGTERM, signal.SIGHUP}
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, ending)
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
-_stopped: Event | None = None
-
-
-def _begin_worker(stopped: Event) -> None:
-    """Leave signals to the process that began the work; it says when to stop."""
-    global _stopped  # noqa: PLW0603 - the pool has no other way to hand an event over
-    _stopped = stopped
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-
-
-def _end_with_parent() -> None:
-    """End with a parent that was killed: a worker would keep its folders locked."""
-    parent = multiprocessing.parent_process()
-    assert parent is not None
-    parent.join()
-    os._exit(1)
-
-
-def _train_seed_in_worker(job: _Job) -> SeedResult:
-    assert _stopped is not None
-    return _train_seed(job, _stopped.is_set)
-
-
-def _train_seed(job: _Job, stop: Callable[[], bool]) -> SeedResult:
+def train_seed(job: SeedJob, stop: Stop) -> SeedResult:
+    """Return what a seed comes to; nothing, if it is to stop before it is done."""
     seed = job.config.seed
     if stop():
         return SeedResult(seed)
     try:
-        cartpole = _model_of(job)
+        cartpole = model_of(job)
         if job.folder is None:
             return _train_in_memory(job, cartpole, stop)
         return _train_on_disk(job, job.folder, cartpole, stop)
     except MjCartPoleError as error:
         return SeedResult(seed, error=str(error))
     except MemoryError:
-        return SeedResult(seed, error="out of memory")
+        return SeedResult(seed, error=OUT_OF_MEMORY)
 
 
-def _model_of(job: _Job) -> CartPole:
+def model_of(job: SeedJob) -> CartPole:
+    """Return the model of a seed's training; it is its own.
+
+    Raises:
+        ModelError: It cannot be used.
+    """
     if job.document is None:
         return load_model()
     return load_named(job.document, job.config.model, own_timestep=job.config.own_timestep)
 
 
-def _train_in_memory(job: _Job, cartpole: CartPole, stop: Callable[[], bool]) -> SeedResult:
+def _train_in_memory(job: SeedJob, cartpole: CartPole, stop: Stop) -> SeedResult:
     training = Training(job.config, engine=job.engine, cartpole=cartpole)
     for _ in training.run():
         if stop():
             return SeedResult(job.config.seed)
     result = training.result()
+    if not job.evaluated:
+        return SeedResult.of(result, None)
     evaluation = evaluate_where_trained(result.policy, job.config, cartpole, job.engine)
     return SeedResult.of(result, evaluation)
 
 
-def _train_on_disk(
-    job: _Job, folder: Path, cartpole: CartPole, stop: Callable[[], bool]
-) -> SeedResult:
+def _train_on_disk(job: SeedJob, folder: Path, cartpole: CartPole, stop: Stop) -> SeedResult:
     seed = job.config.seed
     if runs.is_complete(folder):
         run = runs.check_complete(folder, job.allow_assets)
@@ -320,7 +249,7 @@ def _train_on_disk(
 
 
 @contextlib.contextmanager
-def _begun(job: _Job, folder: Path, cartpole: CartPole) -> Iterator[Checkpoint | None]:
+def _begun(job: SeedJob, folder: Path, cartpole: CartPole) -> Iterator[Checkpoint | None]:
     """Hold a seed's folder; yields where to go on."""
     if CONFIG in runs.content_of(folder):
         with runs.resumed_folder(folder, job.allow_assets) as begun:
@@ -333,6 +262,6 @@ def _begun(job: _Job, folder: Path, cartpole: CartPole) -> Iterator[Checkpoint |
             yield None
 
 
-def _check_same(job: _Job, folder: Path, config: TrainConfig) -> None:
+def _check_same(job: SeedJob, folder: Path, config: TrainConfig) -> None:
     if config != job.config:
         raise RunError(f"'{folder}' holds a run with another config")

@@ -39,7 +39,7 @@ class SeedResult:
     solved_after: int | None = None
 
     @classmethod
-    def of(cls, result: TrainResult, evaluation: Evaluation) -> Self:
+    def of(cls, result: TrainResult, evaluation: Evaluation | None) -> Self:
         """Return what a seed has come to that was trained to the end."""
         after = None if result.solved is None else result.solved.episodes
         return cls(result.config.seed, evaluation, result, solved_after=after)

@@ -1,0 +1,123 @@
+"""A study, from its file to its tables."""
+
+import shlex
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from mjcartpole.commands import progress
+from mjcartpole.commands.options import FAILED
+from mjcartpole.commands.printing import counted
+from mjcartpole.cores import worker_count
+from mjcartpole.physics.simulation import silence_mujoco
+from mjcartpole.signals import Interrupted, StopSignals
+from mjcartpole.studies.study.expect import expect
+from mjcartpole.studies.study.folder import claimed_study
+from mjcartpole.studies.study.measures import MEASURES
+from mjcartpole.studies.study.plan import Plan, PlannedRun, in_words, plan
+from mjcartpole.studies.study.records import RecordLog
+from mjcartpole.studies.study.runner import keep, left_of, run_here, unique
+from mjcartpole.studies.study.study_file import read_study
+from mjcartpole.studies.study.tables import RUNS, write_tables
+
+if TYPE_CHECKING:
+    from mjcartpole.commands.study import Study
+
+SHOWN = 10
+"""Failed runs that are told one by one."""
+
+
+def run(file: Path, folder: Path, how: "Study") -> int:
+    """Do what a study's file asks and is not done yet. Returns the exit code.
+
+    Raises:
+        Interrupted: After Ctrl-C, SIGTERM or SIGHUP, when what is done is kept.
+    """
+    silence_mujoco()
+    planned = plan(read_study(file), how.engine)
+    if how.dry_run:
+        return _dry_run(planned, folder, how)
+    signals = StopSignals()
+    claim = claimed_study(folder, planned.study.text, resume=how.resume, overwrite=how.overwrite)
+    with signals.caught(), claim:
+        log = RecordLog(folder)
+        left = left_of(planned, log)
+        _print_head(planned, left, log)
+        with signals.deferred():
+            found = run_here(left, how.workers, signals.stop)
+            progress.study_runs(keep(found, log), len(left))
+        digest = write_tables(folder, planned, log.found)
+        return _tell(
+            planned, log, folder, digest, signals, f"mjcartpole study {shlex.quote(str(file))}"
+        )
+
+
+def _dry_run(planned: Plan, folder: Path, how: "Study") -> int:
+    left = left_of(planned, RecordLog(folder)) if how.resume else unique(planned)
+    _print_size(planned)
+    for name in planned.study.measure:
+        print(f"measure  {name}: {MEASURES[name].text}")
+    if how.resume:
+        print(f"left     {counted(len(left), 'run')}")
+    if left:
+        expected, workers = expect(left), worker_count(how.workers, len(left))
+        print(
+            f"steps    about {expected.steps:.2g}\n"
+            f"time     about {in_time(expected.seconds / workers)} with {workers} at once"
+        )
+    return 0
+
+
+def in_time(seconds: float) -> str:
+    """Return a stretch of time in words.
+
+    >>> in_time(4.2), in_time(150), in_time(20_000)
+    ('4 s', '2 min 30 s', '5 h 33 min')
+    """
+    whole = max(1, round(seconds))
+    minutes, hours = whole // 60, whole // 3600
+    if hours:
+        return f"{hours} h {minutes % 60} min"
+    return f"{minutes} min {whole % 60} s" if minutes else f"{whole} s"
+
+
+def _print_size(planned: Plan) -> None:
+    study = planned.study
+    factors = ", ".join(f"{each.name}" for each in study.factors)
+    print(f"{counted(planned.points, 'point')} ({study.design}: {factors})")
+    seeds = counted(len(study.seeds), "seed")
+    print(f"{counted(len(planned.runs), 'run')}, {seeds} each")
+
+
+def _print_head(planned: Plan, left: Sequence[PlannedRun], log: RecordLog) -> None:
+    _print_size(planned)
+    if log.damaged:
+        what = counted(log.damaged, "line")
+        print(f"mjcartpole: {log.path}: {what} cut short or damaged, left out", file=sys.stderr)
+    if done := len(unique(planned)) - len(left):
+        print(f"{counted(done, 'run')} done before, {len(left):,} left")
+    sys.stdout.flush()
+
+
+def _tell(
+    planned: Plan, log: RecordLog, folder: Path, digest: str, signals: StopSignals, again: str
+) -> int:
+    left = left_of(planned, log)
+    failed = [run for run in planned.runs if run.key in log.found and log.found[run.key].error]
+    print(f"\nstudy  {folder}\ntable  {folder / RUNS}\ndigest {digest}")
+    for run in failed[:SHOWN]:
+        where = f"{in_words(run.factors)} seed={run.job.config.seed}"
+        print(f"mjcartpole: error: {where} failed: {log.found[run.key].error}", file=sys.stderr)
+    if failed[SHOWN:]:
+        print(f"mjcartpole: error: and {len(failed) - SHOWN} more failed", file=sys.stderr)
+    if left:
+        done = len(unique(planned)) - len(left)
+        said = (
+            f"{done:,} of {done + len(left):,} runs done and kept in {folder}; go on with: "
+            f"{again} --run-dir {shlex.quote(str(folder))} --resume"
+        )
+        if signals.stop():
+            raise Interrupted(f"interrupted with {said}", signals.number)
+        print(f"mjcartpole: error: {said}", file=sys.stderr)
+    return FAILED if left or failed else 0

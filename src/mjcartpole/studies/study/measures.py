@@ -1,0 +1,96 @@
+"""What a study measures of a training."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+
+from mjcartpole.learning.config import TrainConfig
+from mjcartpole.learning.training import TrainResult
+from mjcartpole.studies.seeds import SeedResult
+
+STRETCHES: Final = 50
+"""Points of a learning curve."""
+EVALUATIONS: Final = 20
+"""Greedy evaluations in the midst of a training that is to say when it was solved."""
+
+
+@dataclass(frozen=True)
+class Measure:
+    """A figure of a training.
+
+    Attributes:
+        text: What it is.
+        of: The figure of a training and its evaluation; None where it has none.
+        more_is_better: Whether a larger one is better.
+        budget: Of a training that never came to it, what it spent in vain.
+    """
+
+    text: str
+    of: Callable[[SeedResult, TrainResult], float | None]
+    more_is_better: bool = True
+    budget: str = ""
+
+
+MEASURES: Final[dict[str, Measure]] = {
+    "greedy_mean": Measure(
+        "mean return of 100 greedy episodes after the training",
+        lambda seed, _: None if seed.evaluation is None else seed.evaluation.mean,
+    ),
+    "greedy_minimum": Measure(
+        "the least return of these",
+        lambda seed, _: None if seed.evaluation is None else seed.evaluation.minimum,
+    ),
+    "episodes_to_solve": Measure(
+        "training episodes until a greedy evaluation in its midst was solved",
+        lambda _, result: result.solved and result.solved.episodes,
+        more_is_better=False,
+        budget="episodes_trained",
+    ),
+    "steps_to_solve": Measure(
+        "the steps of these",
+        lambda _, result: result.solved and result.solved.steps,
+        more_is_better=False,
+        budget="steps_trained",
+    ),
+    "area_under_curve": Measure(
+        "mean return of all training episodes: the area under the learning curve, by episode",
+        lambda _, result: float(result.returns.mean()),
+    ),
+    "seconds": Measure(
+        "time of the training; other each time, so it stands apart",
+        lambda _, result: round(result.seconds, 3),
+        more_is_better=False,
+    ),
+}
+"""By name."""
+
+APART: Final = "seconds"
+"""The one that is never the same twice."""
+
+
+def plays_after(measures: Sequence[str]) -> bool:
+    """Return whether greedy episodes are to be played after a training."""
+    return any(name.startswith("greedy") for name in measures)
+
+
+def with_evaluations(config: TrainConfig, measures: Sequence[str]) -> dict[str, Any]:
+    """Return what a config needs besides, to say when it was solved."""
+    wanted = any(name.endswith("to_solve") for name in measures)
+    if not wanted or config.evaluation_period is not None:
+        return {}
+    return {"evaluate_every": max(1, config.episodes // EVALUATIONS)}
+
+
+def figures_of(found: SeedResult, result: TrainResult) -> dict[str, float | None]:
+    """Return all figures of a training that are the same each time."""
+    return {name: each.of(found, result) for name, each in MEASURES.items() if name != APART}
+
+
+def curve_of(result: TrainResult) -> list[list[float]]:
+    """Return the learning curve: up to an episode, the mean return since the point before."""
+    ends = np.unique(np.linspace(0, len(result.returns), STRETCHES + 1).round().astype(int))
+    sums = np.concatenate([[0.0], np.cumsum(result.returns)])
+    means = np.diff(sums[ends]) / np.diff(ends)
+    return [[int(end), float(mean)] for end, mean in zip(ends[1:], means, strict=True)]

@@ -1,0 +1,142 @@
+"""The plan of a study: every training that it needs, each with a key that is the same anywhere."""
+
+import dataclasses
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, Final, Self
+
+from mjcartpole.errors import ConfigError, ModelError
+from mjcartpole.learning.checkpoints import checksum
+from mjcartpole.learning.config import TrainConfig
+from mjcartpole.learning.engine import Engine, choose_engine
+from mjcartpole.learning.run_model import check_storable
+from mjcartpole.learning.training import training_grid
+from mjcartpole.physics.cartpole import CartPole
+from mjcartpole.studies.multi_seed import SeedJob
+from mjcartpole.studies.study.design import Point, points_of
+from mjcartpole.studies.study.measures import plays_after, with_evaluations
+from mjcartpole.studies.study.settings import PRESET, as_text, config_of, is_edit
+from mjcartpole.studies.study.study_file import Study, raise_all
+
+MOST_RUNS: Final = 1_000_000
+_KEY_DIGITS: Final = 16
+"""Of a million runs, two have the same key with a chance of 3e-8."""
+
+
+@dataclass(frozen=True)
+class PlannedRun:
+    """One training of a study.
+
+    Attributes:
+        key: A hash of config and model.
+        point: Number of its point, from 1 on.
+        factors: The point.
+        job: What is to be trained.
+    """
+
+    key: str
+    point: int
+    factors: Point
+    job: SeedJob
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """All that a study needs.
+
+    Attributes:
+        study: What is asked.
+        points: How many there are.
+        runs: Point by point, in each seed by seed.
+    """
+
+    study: Study
+    points: int
+    runs: tuple[PlannedRun, ...]
+
+
+def plan(study: Study, engine: Engine = "compiled") -> Plan:
+    """Return every training that a study needs; all models are loaded and checked.
+
+    Raises:
+        ConfigError: A point makes no sense, or there are too many; a line for each mistake.
+    """
+    points = points_of(study.factors, study.design, study.samples, study.design_seed)
+    if len(points) * len(study.seeds) > MOST_RUNS:
+        raise ConfigError(
+            f"{len(points):,} points with {len(study.seeds):,} seeds each are more than "
+            f"{MOST_RUNS:,} runs; give fewer"
+        )
+    mistakes, runs, models = list[str](), list[PlannedRun](), dict[Any, _Model]()
+    for number, point in enumerate(points, start=1):
+        try:
+            runs += _runs(study, point, number, engine, models)
+        except (ConfigError, ModelError) as error:
+            mistakes.append(f"{in_words(point)}: {error}")
+    if not mistakes:
+        mistakes += _in_vain(study, runs)
+    raise_all(mistakes)
+    return Plan(study, len(points), tuple(runs))
+
+
+def in_words(point: Point) -> str:
+    """Return a point as a person reads it.
+
+    >>> in_words({"alpha": 0.1, "bins": (1, 3)})
+    'alpha=0.1 bins=1,3'
+    """
+    return " ".join(f"{name}={as_text(value)}" for name, value in point.items())
+
+
+@dataclass(frozen=True)
+class _Model:
+    """A model, and a digest of all that it was compiled from."""
+
+    cartpole: CartPole
+    digest: str
+
+    @classmethod
+    def of(cls, config: TrainConfig) -> Self:
+        cartpole = config.load_model()
+        check_storable(cartpole)
+        # Files are named by what is in them there.
+        return cls(cartpole, checksum(cartpole.stored[0]))
+
+
+def _runs(
+    study: Study, point: Point, number: int, engine: Engine, models: dict[Any, _Model]
+) -> Iterator[PlannedRun]:
+    """Yield the runs of a point, seed by seed."""
+    config = config_of(study.base, point, study.seeds[0])
+    config = dataclasses.replace(config, **with_evaluations(config, study.measure))
+    if config.evaluation_period is not None and config.solved_at is None:
+        raise ConfigError(f"nobody agreed what solves {config.task}; give until in [base]")
+    where = config.model, config.set, config.own_timestep
+    if where not in models:
+        models[where] = _Model.of(config)
+    cartpole, digest = models[where].cartpole, models[where].digest
+    training_grid(config, cartpole)
+    on_mujoco = config.backend == "mujoco"
+    chosen = choose_engine(engine, config.backend, cartpole if on_mujoco else None, config.rules)
+    document = cartpole.xml if on_mujoco else None
+    job = SeedJob(config, chosen, document, evaluated=plays_after(study.measure))
+    for seed in study.seeds:
+        one = job.of(seed)
+        yield PlannedRun(_key(one.config, digest if on_mujoco else ""), number, point, one)
+
+
+def _key(config: TrainConfig, digest: str) -> str:
+    """Return a hash of all that decides a training, whatever its model is called here."""
+    values = config.values() | ({"model": digest, "set": ()} if digest else {})
+    text = json.dumps(values, sort_keys=True)
+    return checksum(text)[:_KEY_DIGITS]
+
+
+def _in_vain(study: Study, runs: list[PlannedRun]) -> Iterator[str]:
+    """Yield the settings of all that no training has."""
+    had = set[str]().union(*({*run.job.config.fields()} for run in runs))
+    methods = ", ".join(dict.fromkeys(run.job.config.method for run in runs))
+    for name in study.base:
+        if name != PRESET and not is_edit(name) and name not in had:
+            yield f"[base] {name}: no method of this study has it ({methods})"
