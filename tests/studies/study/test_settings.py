@@ -59,7 +59,7 @@ def test_a_value_of_another_kind_is_refused(name, value, said):
 @pytest.mark.parametrize(
     ("name", "said"),
     [
-        ("alhpa", "nothing is called 'alhpa'; did you mean alpha"),
+        ("alpa", "nothing is called 'alpa'; did you mean alpha"),
         ("seed", r"\[study\] has seeds = 6"),
         ("pole.lenght", "did you mean 'pole.length'"),
         ("joint:hinge.dampnig", "has no attribute 'dampnig'"),

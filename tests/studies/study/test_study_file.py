@@ -59,7 +59,7 @@ def test_a_file_means_what_it_says(tmp_path):
         ("", "[factors] is empty"),
         ("[factors]\nalpha = []", "[factors] alpha has no levels"),
         ("[factors]\nalpha = 0.1", "belongs to [base]"),
-        ("[factors]\nalhpa = [0.1]", "did you mean alpha?"),
+        ("[factors]\nalpa = [0.1]", "did you mean alpha?"),
         ("[factors]\nalpha = {low = 1, high = 0}", "low below high"),
         ("[factors]\nalpha = {low = 0, high = 1, log = true}", "needs a range above 0"),
         ("[factors]\nalpha = {low = 0, high = 1}", "a grid needs levels = N"),
@@ -93,7 +93,7 @@ def test_all_mistakes_are_told_at_once():
         preset = "tund"
         gravity = "x"
         [factors]
-        alhpa = [1]
+        alpa = [1]
         gamma = []
         """
     )
