@@ -4,11 +4,11 @@ import shlex
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from mjcartpole.commands import progress
 from mjcartpole.commands.options import FAILED
 from mjcartpole.commands.printing import counted
+from mjcartpole.commands.study_options import StudyOptions
 from mjcartpole.cores import worker_count
 from mjcartpole.physics.simulation import silence_mujoco
 from mjcartpole.signals import Interrupted, StopSignals
@@ -21,14 +21,11 @@ from mjcartpole.studies.study.runner import keep, left_of, run_here, unique
 from mjcartpole.studies.study.study_file import read_study
 from mjcartpole.studies.study.tables import RUNS, write_tables
 
-if TYPE_CHECKING:
-    from mjcartpole.commands.study import Study
-
 SHOWN = 10
 """Failed runs that are told one by one."""
 
 
-def run(file: Path, folder: Path, how: "Study") -> int:
+def run(file: Path, folder: Path, how: StudyOptions) -> int:
     """Do what a study's file asks and is not done yet. Returns the exit code.
 
     Raises:
@@ -53,7 +50,7 @@ def run(file: Path, folder: Path, how: "Study") -> int:
         )
 
 
-def _dry_run(planned: Plan, folder: Path, how: "Study") -> int:
+def _dry_run(planned: Plan, folder: Path, how: StudyOptions) -> int:
     left = left_of(planned, RecordLog(folder)) if how.resume else unique(planned)
     _print_size(planned)
     for name in planned.study.measure:
