@@ -141,20 +141,10 @@ def test_some_rules_are_others():
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"x_limit": 0}, r"x_limit must be a number \(m\) more than 0 .* infinite, not 0"),
-        ({"x_limit": 1e11}, "at most 1e"),
-        ({"theta_limit": -0.1}, r"theta_limit must be a number \(rad\) more than 0"),
-        ({"theta_limit": "wide"}, "not 'wide'"),
-        ({"theta_limit": True}, "not True"),
-        ({"theta_limit": 10**400}, "theta_limit must be"),
-        ({"start_low": math.nan}, r"start_low must be a number \(m, m/s, rad, rad/s\) from -1e"),
-        ({"start_high": UP}, "start_high must be"),
+        ({"x_limit": 0}, r"x_limit must be a number \(m\) more than 0"),
         ({"start_low": 0.06}, r"start_low \(0\.06\) is above start_high \(0\.05\)"),
-        ({"start_angle": [1]}, r"start_angle must be a number \(rad\)"),
         ({"start_angle": 3.1}, r"between theta = 3\.05 and 3\.15 rad, all beyond theta_limit"),
         ({"start_high": 9, "start_low": 3}, r"between x = 3 and 9 m, all beyond x_limit, 2\.4"),
-        ({"reward": "uprigth"}, "'uprigth' is unknown; .* did you mean 'upright'"),
-        ({"reward": 1.0}, "reward must be one of one-per-step, .* or a function, not 1.0"),
     ],
 )
 def test_changes_that_make_no_sense_are_told_in_one_line(changes, message):

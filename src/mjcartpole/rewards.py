@@ -34,6 +34,12 @@ REWARDS: Final[Mapping[str, Reward]] = {
 }
 """What rewards are called where no function can be given."""
 
+
+def named(value: object) -> object:
+    """Return a reward's name, if it has one; anything else as it is."""
+    return next((name for name, reward in REWARDS.items() if reward is value), value)
+
+
 CONSTANT: Final[Mapping[Reward, float]] = {one_per_step: 1.0, minus_one_at_the_end: 0.0}
 """Rewards that are the same number for every step that ends nothing, and that number: what need
 not be called in hot paths."""

@@ -9,38 +9,22 @@ import dataclasses
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Final, SupportsFloat, TypedDict, TypeVar, Unpack, cast
+from typing import Any, Final, TypeVar, Unpack
 
 import numpy as np
 import numpy.typing as npt
 
 from mjcartpole.errors import ConfigError, check_known
-from mjcartpole.rewards import CONSTANT, REWARDS, Reward, one_per_step, upright
+from mjcartpole.rewards import CONSTANT, Reward, named, one_per_step, upright
+from mjcartpole.rules import RULES, Changes, checked
 
 CONTROL_STEP: Final = 0.02
 """Seconds between two actions."""
-
-MOST_STEPS: Final = 10_000_000
-"""Of one episode: two days and a half."""
-
-FARTHEST: Final = 1e10
-"""Of any position, velocity and limit, in m, m/s, rad or rad/s: what MuJoCo still calls sane."""
 
 _TURN: Final = 2 * math.pi
 
 Number = TypeVar("Number", float, npt.NDArray[np.float64])
 """One, or many."""
-
-
-class Changes(TypedDict, total=False):
-    """Rules that are to be others than the task's; None leaves one as it is. See `Task`."""
-
-    x_limit: float | None
-    theta_limit: float | None
-    start_low: float | None
-    start_high: float | None
-    start_angle: float | None
-    reward: Reward | str | None
 
 
 @dataclass(frozen=True)
@@ -164,7 +148,7 @@ class Task:
             raise TypeError(f"got an unexpected keyword argument {unknown[0]!r}")
         asked: dict[str, Any] = {**changes, "time_limit": max_episode_steps}
         given: dict[str, Any] = {
-            name: _checked(name, asked[name]) for name in asked if asked[name] is not None
+            name: checked(name, asked[name]) for name in asked if asked[name] is not None
         }
         if all(getattr(self, name) == value for name, value in given.items()):
             return self
@@ -200,72 +184,18 @@ class Task:
 
     @property
     def changes(self) -> dict[str, object]:
-        """What `resolve` needs beside the name to make it again, but for the time limit."""
-        own, names = TASKS.get(self.name, self), Changes.__annotations__
-        differ = [name for name in names if getattr(self, name) != getattr(own, name)]
-        return {name: getattr(self, name) for name in differ}
+        """What `resolve` needs beside the name to make it again."""
+        own = TASKS.get(self.name, self)
+        pairs = ((name, getattr(self, rule), getattr(own, rule)) for name, rule in RULES.items())
+        return {name: named(value) for name, value, its in pairs if value != its}
 
-
-def number_of(name: str, value: SupportsFloat | str, unit: str, *, is_limit: bool = False) -> float:
-    """Return the number that a rule is.
-
-    Args:
-        name: What the rule is called.
-        value: What was given.
-        unit: What it counts.
-        is_limit: Whether it is more than 0, and may be infinite.
-
-    Raises:
-        ConfigError: It is none.
-    """
-    try:
-        number = math.nan if isinstance(value, bool | str) else float(value)
-    except (TypeError, ValueError, OverflowError):
-        number = math.nan
-    if (is_limit and number == math.inf) or (
-        -FARTHEST <= number <= FARTHEST and (number > 0 or not is_limit)
-    ):
-        # Without the sum, numpy calls 0.0 to -0.0 a range that runs backwards.
-        return number + 0.0
-    bounds = (
-        f"more than 0 and at most {FARTHEST:g}, or infinite"
-        if is_limit
-        else f"from {-FARTHEST:g} to {FARTHEST:g}"
-    )
-    raise ConfigError(f"{name} must be a number ({unit}) {bounds}, not {value!r}")
-
-
-_STATE: Final = "m, m/s, rad, rad/s"
-_UNITS: Final = {
-    "x_limit": "m",
-    "theta_limit": "rad",
-    "start_low": _STATE,
-    "start_high": _STATE,
-    "start_angle": "rad",
-}
-
-
-def _checked(name: str, value: Any) -> float | Reward:  # noqa: ANN401 - whatever was given
-    """A rule as a task has it, or ConfigError."""
-    if name == "time_limit":
-        if type(value) is int and 1 <= value <= MOST_STEPS:
-            return value
-        raise ConfigError(
-            f"max_episode_steps must be a whole number from 1 to {MOST_STEPS:,}, not {value!r}"
-        )
-    if name == "reward":
-        return _reward(value)
-    return number_of(name, value, _UNITS[name], is_limit=name.endswith("limit"))
-
-
-def _reward(value: Any) -> Reward:  # noqa: ANN401 - whatever was given
-    if callable(value):
-        return cast(Reward, value)
-    if not isinstance(value, str):
-        known = ", ".join(REWARDS)
-        raise ConfigError(f"reward must be one of {known} or a function, not {value!r}")
-    check_known("reward", value, REWARDS)
-    return REWARDS[value]
+    @property
+    def summary(self) -> str:
+        """Its name, length and changes, in words."""
+        changes = [
+            f"{name} {value}" for name, value in self.changes.items() if name != "max_episode_steps"
+        ]
+        return f"{self.name} ({', '.join([f'{self.time_limit:,} steps', *changes])})"
 
 
 CARTPOLE_V1: Final = Task("CartPole-v1", reward_threshold=475.0)

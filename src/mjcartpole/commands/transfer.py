@@ -1,6 +1,5 @@
 """`mjcartpole transfer`."""
 
-import dataclasses
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -12,6 +11,7 @@ from mjcartpole.commands.options import Command, OutputPath, Policies
 from mjcartpole.errors import ConfigError
 from mjcartpole.integrator import Integrator
 from mjcartpole.learning.evaluation import EPISODES, SEED, Player
+from mjcartpole.rule_changes import RuleChanges
 from mjcartpole.studies.eval_target import EvalTarget
 from mjcartpole.task import CARTPOLE_V1
 
@@ -24,7 +24,7 @@ PolicyGroups = Mapping[str, Sequence[Player]]
 
 
 @dataclass(frozen=True)
-class Transfer(Command):
+class Transfer(RuleChanges, Command):
     """Play policies on models they were not trained on; or see how far a number can move."""
 
     sources: Policies = ()
@@ -41,10 +41,6 @@ class Transfer(Command):
     """gym: explicit Euler, as CartPole-v1; mujoco: the integrator that the model's file names."""
     own_timestep: bool = False
     """Let a control step be one physics step of a model's file, instead of 0.02 s."""
-    task: str | None = None
-    """The rules: limits, starting states, reward, time limit; the policies' own if left out."""
-    max_episode_steps: int | None = None
-    """Control steps until an episode is truncated; the rules' own if left out."""
     episodes: int = EPISODES
     """Greedy episodes of each policy on each model."""
     seed: int = SEED
@@ -124,12 +120,13 @@ class Transfer(Command):
     def _task(self) -> "Task":
         """Return by whose rules is played: those asked for, or all that the policies know."""
         known = dict.fromkeys(self._set_up(source).task for source in self.sources)
-        known = known or {self._rules.rules(CARTPOLE_V1): None}
+        known = known or {self.applied_to(CARTPOLE_V1): None}
         if len(known) > 1:
-            names = " and ".join(f"{task.name} ({task.time_limit:,} steps)" for task in known)
+            names = " and ".join(task.summary for task in known)
             raise ConfigError(
-                f"the policies were trained by the rules of {names}; say by --task and "
-                "--max-episode-steps which are played, so that their returns can be compared"
+                f"the policies were trained by the rules of {names}; say by --task, "
+                "--max-episode-steps and the like which are played, so that their returns can be "
+                "compared"
             )
         return next(iter(known))
 
@@ -140,11 +137,9 @@ class Transfer(Command):
 
         if is_seeds(source):
             source = next(iter(learned_seeds(source)[0].values()))
-        return set_up(source, dataclasses.replace(self._rules, allow_assets=self.allow_assets))
-
-    @property
-    def _rules(self) -> EvalTarget:
-        return EvalTarget(task=self.task, max_episode_steps=self.max_episode_steps)
+        return set_up(
+            source, EvalTarget(allow_assets=self.allow_assets, task=self.task, **self.changes)
+        )
 
     def _find_policies(self) -> PolicyGroups:
         """Return policies by name, of many seeds all under one; those of one name by paths."""

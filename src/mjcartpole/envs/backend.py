@@ -9,7 +9,8 @@ from mjcartpole.envs.gym_task import GymTask
 from mjcartpole.envs.registration import ENV_ID, env_id
 from mjcartpole.errors import ConfigError, check_known
 from mjcartpole.integrator import Integrator, check_integrator
-from mjcartpole.task import CARTPOLE_V1, CONTINUOUS, Changes, Task, resolve
+from mjcartpole.rules import Changes
+from mjcartpole.task import CARTPOLE_V1, CONTINUOUS, Task, resolve
 
 if TYPE_CHECKING:
     from mjcartpole.physics.load import ModelLike

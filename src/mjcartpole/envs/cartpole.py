@@ -25,9 +25,9 @@ from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.load import Edits, ModelLike, load_shared
 from mjcartpole.physics.simulation import FARTHEST_SANE, Simulation, State, as_seen, check_sane
 from mjcartpole.rewards import CONSTANT
+from mjcartpole.rules import Changes
 from mjcartpole.task import (
     CARTPOLE_V1,
-    Changes,
     Task,
     frame_rate,
 )

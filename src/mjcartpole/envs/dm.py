@@ -18,12 +18,12 @@ from mjcartpole.errors import ConfigError, check_known
 from mjcartpole.physics.bodies import starting_state
 from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.load import Edits, ModelLike, load_model
+from mjcartpole.rules import Changes
 from mjcartpole.task import (
     CARTPOLE_V1,
     CONTROL_STEP,
     N_ACTIONS,
     TASKS,
-    Changes,
     Task,
     worst_pole,
 )

@@ -17,7 +17,8 @@ from mjcartpole.physics.edit.rescale import length_of
 from mjcartpole.physics.parameters import forces_of, pole_of
 from mjcartpole.physics.simulation import Simulation
 from mjcartpole.physics.structure import directions
-from mjcartpole.task import Task, in_words, number_of
+from mjcartpole.rules import number_of
+from mjcartpole.task import Task, in_words
 
 Numbers = float | tuple[float, ...]
 """A number, or one for each of several poles."""

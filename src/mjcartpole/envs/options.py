@@ -8,7 +8,8 @@ from gymnasium.envs.classic_control.utils import maybe_parse_reset_bounds
 
 from mjcartpole.errors import ConfigError
 from mjcartpole.rewards import minus_one_at_the_end
-from mjcartpole.task import CARTPOLE_V1, Changes, Task, resolve
+from mjcartpole.rules import Changes
+from mjcartpole.task import CARTPOLE_V1, Task, resolve
 
 
 class ResetOptions(NamedTuple):

@@ -11,7 +11,7 @@ from gymnasium.envs.registration import EnvSpec
 from mjcartpole.envs.editable import Editable
 from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.load import is_its_document
-from mjcartpole.rewards import REWARDS
+from mjcartpole.rewards import named
 from mjcartpole.task import Task
 
 
@@ -42,10 +42,9 @@ def portable(spec: EnvSpec, cartpole: CartPole) -> EnvSpec:
     """
     task = spec.kwargs.get("task")
     changes = task.changes if isinstance(task, Task) else {}
+    # Gymnasium's own time limit has that.
+    changes.pop("max_episode_steps", None)
     arguments = {name: _plain(value) for name, value in {**changes, **spec.kwargs}.items()}
-    for name, reward in REWARDS.items():
-        if arguments.get("reward") is reward:
-            arguments["reward"] = name
     if not isinstance(arguments.get("model", ""), str):
         arguments["model"] = cartpole.xml
         arguments.pop("edits", None)
@@ -72,4 +71,4 @@ def _plain(value: Any) -> Any:  # noqa: ANN401 - whatever it is
         return {key: _plain(each) for key, each in value.items()}
     if isinstance(value, list | tuple):
         return type(value)(map(_plain, value))
-    return value
+    return named(value)

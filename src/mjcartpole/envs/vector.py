@@ -23,9 +23,9 @@ from mjcartpole.physics.batch_simulation import BatchSimulation
 from mjcartpole.physics.bodies import starting_state
 from mjcartpole.physics.load import Edits, ModelLike, load_model
 from mjcartpole.rewards import CONSTANT
+from mjcartpole.rules import Changes
 from mjcartpole.task import (
     CARTPOLE_V1,
-    Changes,
     Task,
     frame_rate,
     state_names,

@@ -170,7 +170,7 @@ def _line(digest: str) -> bytes:
 def _pack(checkpoint: Checkpoint) -> bytes:
     snapshot = checkpoint.snapshot
     about = {
-        "config": checkpoint.config.values(),
+        "config": checkpoint.config.stored(),
         "model": checkpoint.model,
         "env_rng": snapshot.env_rng,
         "learner_rng": snapshot.learner_rng,

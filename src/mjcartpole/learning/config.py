@@ -18,13 +18,10 @@ from mjcartpole.learning.discretizer import Discretizer, is_finite
 from mjcartpole.learning.methods import METHODS, method_named
 from mjcartpole.learning.methods.parameters import Parameters
 from mjcartpole.learning.presets import PRESETS
-from mjcartpole.task import (
-    CARTPOLE_V1,
-    Task,
-    in_words,
-    resolve,
-    state_names,
-)
+from mjcartpole.rewards import REWARDS, named
+from mjcartpole.rule_changes import RuleChanges
+from mjcartpole.rules import RULES
+from mjcartpole.task import CARTPOLE_V1, Task, in_words, state_names
 
 if TYPE_CHECKING:
     from mjcartpole.physics.cartpole import CartPole
@@ -45,7 +42,7 @@ DEFAULT_METHOD: Final = "q-learning"
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
-class TrainConfig:
+class TrainConfig(RuleChanges):
     """All that decides a training. Equal configs give equal tables, bit for bit.
 
     The fields below are those of every training; beside them a config has the parameters of its
@@ -57,6 +54,8 @@ class TrainConfig:
     TrainConfig(method='sarsa', epsilon=0.5)
     """
 
+    task: str = CARTPOLE_V1.name
+    """The rules: limits, starting states, reward, time limit."""
     backend: Backend = "mujoco"
     """Who does the physics: mujoco, or gymnasium's own CartPole-v1."""
     model: str = "cartpole"
@@ -67,10 +66,6 @@ class TrainConfig:
     """Let a control step be one physics step of the model's file, instead of 0.02 s."""
     integrator: Integrator = "gym"
     """gym: explicit Euler, as CartPole-v1; mujoco: the integrator that the model's file names."""
-    task: str = CARTPOLE_V1.name
-    """The rules: limits, starting states, reward, time limit."""
-    max_episode_steps: int | None = None
-    """Control steps until an episode is truncated; the task's own, 500, if left out."""
     method: str = DEFAULT_METHOD
     """How the table learns; each method has parameters of its own."""
     episodes: int = 1_000
@@ -125,7 +120,7 @@ class TrainConfig:
         check_backend(
             self.backend, self.model, self.integrator, self.set, own_timestep=self.own_timestep
         )
-        object.__setattr__(self, "task", resolve(self.task).name)
+        self._take_rules()
         if self.rules.continuous:
             raise ConfigError(f"a table chooses between two actions; {self.task} takes any push")
         self._check_counts()
@@ -172,12 +167,17 @@ class TrainConfig:
 
     @property
     def rules(self) -> Task:
-        """The task itself, with episodes of the length that was asked for.
+        """The task itself, with what was changed of it.
 
         Raises:
-            ConfigError: There is none of that name, or none of that length.
+            ConfigError: There is none of that name, or the changes make no sense.
         """
-        return resolve(self.task, max_episode_steps=self.max_episode_steps)
+        return self.applied_to(CARTPOLE_V1)
+
+    def stored(self) -> dict[str, Any]:
+        """Return `values` as JSON has them, which has no infinity: that one is a text."""
+        values = self.values()
+        return {name: "inf" if values[name] == math.inf else values[name] for name in values}
 
     def load_model(self) -> "CartPole":
         """Load the model that the config names; for backend gym the reference, as it is drawn.
@@ -227,6 +227,19 @@ class TrainConfig:
     @property
     def _most_poles(self) -> int:
         return max(len(getattr(self, name)) for name in _GRID) // 2 - 1
+
+    def _take_rules(self) -> None:
+        """Keep the task's name, and of what is changed numbers and names: what JSON can hold."""
+        rules = self.applied_to(CARTPOLE_V1)
+        for name, value in self.changes.items():
+            if value is not None or name in rules.changes:
+                object.__setattr__(self, name, named(getattr(rules, RULES[name])))
+        object.__setattr__(self, "task", rules.name)
+        if callable(self.reward):
+            raise ConfigError(
+                f"a config holds the name of a reward ({', '.join(REWARDS)}), not a function; "
+                "for one of your own, register_task a Task that has it"
+            )
 
     def _check_dimensions(self) -> None:
         for name in _GRID:

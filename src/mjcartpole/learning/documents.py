@@ -1,5 +1,6 @@
 """A run's config and summary, read back as if somebody else had written them."""
 
+import math
 from pathlib import Path
 from typing import Any, Final
 
@@ -7,6 +8,7 @@ from mjcartpole.envs.backend import Backend
 from mjcartpole.learning.config import DEFAULT_METHOD, TrainConfig, config_class
 from mjcartpole.learning.episodes import ENDINGS
 from mjcartpole.learning.stored import Fields, checked, read_document
+from mjcartpole.rules import RULES
 from mjcartpole.task import CARTPOLE_V1
 
 CONFIG, SUMMARY = "config.json", "summary.json"
@@ -19,7 +21,7 @@ _ADDED: Final = {
     "evaluate_every": None,
     "until": None,
     "tilings": 1,
-    "max_episode_steps": None,
+    **dict.fromkeys(RULES),
 }
 """Fields that configs of version 0.1 lack, and what they stood for."""
 _SUMMARY_FIELDS: Final[Fields] = {
@@ -72,7 +74,11 @@ def read_values(values: dict[str, Any]) -> TrainConfig:
     """
     fields = config_class(str(values.get("method", DEFAULT_METHOD))).fields()
     added = {name: value for name, value in _ADDED.items() if name in fields}
-    return TrainConfig(**checked(added | values, fields))
+    # JSON has no infinity; see `TrainConfig.stored`.
+    endless = {
+        name: math.inf for name in RULES if name[-5:] == "limit" and values.get(name) == "inf"
+    }
+    return TrainConfig(**checked(added | values | endless, fields))
 
 
 def read_summary(folder: Path) -> dict[str, Any]:

@@ -160,7 +160,7 @@ def begin_run(
     _remove_files(folder, keep=cartpole.stored[1])
     write_versions(folder)
     write_model(folder, cartpole)
-    about = {"preset": preset, "video": video, **config.values()}
+    about = {"preset": preset, "video": video, **config.stored()}
     write_whole(folder / CONFIG, _json(about))
 
 

@@ -5,11 +5,11 @@ from pathlib import Path
 
 from mjcartpole.envs.backend import Backend
 from mjcartpole.integrator import Integrator
-from mjcartpole.task import Task, resolve
+from mjcartpole.rule_changes import RuleChanges
 
 
 @dataclass(frozen=True)
-class EvalTarget:
+class EvalTarget(RuleChanges):
     """Where a policy is played; None means: where it was trained."""
 
     backend: Backend | None = None
@@ -26,18 +26,3 @@ class EvalTarget:
     """Seeds the starting states; the same as after training if left out."""
     allow_assets: tuple[Path, ...] = ()
     """Folders in which the meshes and textures of a run's model may lie, besides the run's own."""
-    task: str | None = None
-    """The rules: limits, starting states, reward, time limit; the run's own if left out."""
-    max_episode_steps: int | None = None
-    """Control steps until an episode is truncated; the rules' own if left out."""
-
-    def rules(self, otherwise: Task) -> Task:
-        """Return the rules that are played by.
-
-        Args:
-            otherwise: Where no task is named.
-
-        Raises:
-            ConfigError: There is no such task, or there are no such episodes.
-        """
-        return resolve(self.task or otherwise, max_episode_steps=self.max_episode_steps)

@@ -110,7 +110,7 @@ def begin_seeds(
     """
     runs.write_versions(folder)
     write_model(folder, cartpole)
-    about = {"preset": preset, "seeds": list(seeds), "config": config.values()}
+    about = {"preset": preset, "seeds": list(seeds), "config": config.stored()}
     write_whole(folder / SEEDS, json.dumps(about, indent=2) + "\n")
 
 

@@ -101,9 +101,7 @@ def _placed(
     if backend == "gym":
         # Gymnasium's cart-pole has neither; only what the user asks for is held against that.
         own_model = "cartpole"
-        config = TrainConfig(
-            backend="gym", task=config.task, max_episode_steps=config.max_episode_steps
-        )
+        config = TrainConfig(backend="gym", task=config.rules)
     model, integrator = target.model or own_model, target.integrator or config.integrator
     check_backend(backend, model, integrator, target.set, own_timestep=target.own_timestep)
     own_timestep = config.own_timestep or target.own_timestep
@@ -112,7 +110,7 @@ def _placed(
         played_on = run.cartpole(target.allow_assets, own_timestep=own_timestep)
     if target.set or (own_timestep and played_on == model):
         played_on = load_model(played_on, target.set, own_timestep=own_timestep)
-    rules = target.rules(config.rules)
+    rules = target.applied_to(config.rules)
     return PolicySetup(name, policy, backend, played_on, integrator, seed, rules)
 
 
