@@ -21,7 +21,9 @@ from numba import types
 from numba.extending import register_jitable
 
 from mjcartpole import rewards, task
+from mjcartpole.learning import ahead as looking_ahead
 from mjcartpole.learning import discretizer, episodes, fitted, stepping, tiles
+from mjcartpole.learning.ahead import foresee, go_on
 from mjcartpole.learning.discretizer import Grid
 from mjcartpole.learning.episodes import Columns
 from mjcartpole.learning.methods import experience
@@ -104,12 +106,13 @@ def _learn_episode(
     row = _row_of(observe(physics, rules, state), grid)
     s, mirrored = _folded(row, grid.folding)
     states[0] = s
+    ahead = foresee(physics, state)
     total, steps, over, terminated = 0.0, 0, False, False
     while not over:
         a = act(p, memory, rates, s, rngs[1])
         pushed = 1 - a if mirrored else a
         visits[2 * _home(p.tiles, row) + pushed] += 1
-        state = advance(physics, rules, state, pushed)
+        state, ahead = go_on(physics, rules, state, pushed, ahead)
         terminated = is_over(rules, state)
         if terminated and has_diverged(state):
             note(physics, state, steps, scratch.failure)
@@ -349,6 +352,7 @@ def _sources(reward: Any, *functions: Any) -> str:
 
 
 _SHARED: Final = (
+    looking_ahead,
     cartpole_v1,
     discretizer,
     episodes,

@@ -133,13 +133,14 @@ _floats, _ints = _array_at(types.float64), _array_at(types.int64)
 
 _max_abs, _wrapped = compiled(task.max_abs), compiled(task.wrapped)
 _carray = numba.carray  # type: ignore[attr-defined]
+register_jitable(cartpole_v1.cartpole_v1_moved)
 _cartpole_v1_step = compiled(cartpole_v1.cartpole_v1_step)
 
 _mj_step = types.ExternalFunction("mj_step", types.void(types.intp, types.intp))
 _mj_reset = types.ExternalFunction("mj_resetData", types.void(types.intp, types.intp))
 
 
-def _for_each(mujoco: F, gym: F, **others: Callable[..., State]) -> Callable[[F], F]:
+def _for_each(mujoco: F, gym: F, **others: Callable[..., Any]) -> Callable[[F], F]:
     """Let Numba take one function of these for a stub, by the physics: its first argument.
 
     Args:

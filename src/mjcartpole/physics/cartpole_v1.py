@@ -25,7 +25,13 @@ def cartpole_v1_step(
 
     In m, m/s, rad, rad/s; the force pushes the cart along +x, N.
     """
-    cos, sin = np.cos(theta), np.sin(theta)
+    return cartpole_v1_moved(x, x_dot, theta, theta_dot, force, np.sin(theta), np.cos(theta))
+
+
+def cartpole_v1_moved(
+    x: float, x_dot: float, theta: float, theta_dot: float, force: float, sin: float, cos: float
+) -> tuple[float, float, float, float]:
+    """Return the same, where sine and cosine of the angle are known."""
     temp = (force + _POLE_MASS_LENGTH * (theta_dot * theta_dot) * sin) / _TOTAL_MASS
     theta_acc = (_GRAVITY * sin - cos * temp) / (
         _LENGTH * (4.0 / 3.0 - _MASS_POLE * (cos * cos) / _TOTAL_MASS)

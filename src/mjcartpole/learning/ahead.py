@@ -1,0 +1,57 @@
+"""A step that is worked out ahead of its action, as compiled code.
+
+Of gymnasium's equations both next states are computed while the action is still looked up, and the
+sine of the next angle, which no force changes, sooner still: a processor does all that at once. The
+numbers are those of `stepping.advance`, which everything else waits for.
+"""
+
+from typing import Any
+
+import numpy as np
+from numba.extending import register_jitable
+
+from mjcartpole.learning.stepping import AnyPhysics, Rules, State, _for_each, advance
+from mjcartpole.physics.cartpole_v1 import cartpole_v1_moved
+
+
+@register_jitable
+def _both_next(physics: AnyPhysics, state: State, sin: float, cos: float) -> Any:
+    x, x_dot, theta, theta_dot = state
+    left = cartpole_v1_moved(x, x_dot, theta, theta_dot, physics.left, sin, cos)
+    right = cartpole_v1_moved(x, x_dot, theta, theta_dot, physics.right, sin, cos)
+    return left, right, np.sin(left[2]), np.cos(left[2])
+
+
+def _foresee_gym(physics: AnyPhysics, state: State) -> Any:
+    return _both_next(physics, state, np.sin(state[2]), np.cos(state[2]))
+
+
+def _foresee_nothing(physics: AnyPhysics, state: State) -> Any:
+    return None
+
+
+@_for_each(_foresee_nothing, _foresee_nothing, GymPhysics=_foresee_gym)
+def foresee(physics: AnyPhysics, state: State) -> Any:
+    """Return what is known of the next step whatever the action, for `go_on`."""
+    raise NotImplementedError  # Numba takes one of those above; so below.
+
+
+def _go_on_gym(
+    physics: AnyPhysics, rules: Rules, state: State, action: int, ahead: Any
+) -> tuple[State, Any]:
+    state = ahead[1] if action == 1 else ahead[0]
+    return state, _both_next(physics, state, ahead[2], ahead[3])
+
+
+def _go_on(
+    physics: AnyPhysics, rules: Rules, state: State, action: int, ahead: Any
+) -> tuple[State, Any]:
+    return advance(physics, rules, state, action), None
+
+
+@_for_each(_go_on, _go_on, GymPhysics=_go_on_gym)
+def go_on(
+    physics: AnyPhysics, rules: Rules, state: State, action: int, ahead: Any
+) -> tuple[State, Any]:
+    """Return the state one control step later, and what is known of the step after it."""
+    raise NotImplementedError
