@@ -72,6 +72,13 @@ def test_memory_is_bounded(compiled):
     assert len(compiled) == before + 2
 
 
+def test_what_is_asked_for_again_and_again_is_kept(compiled):
+    base = load_shared(REFERENCE)
+    for number in range(2 * cache.MOST):
+        load_shared(REFERENCE.replace("9.8", f"9.{number}1"))
+        assert load_shared(REFERENCE).model is base.model
+
+
 def test_what_fails_fails_each_time_by_its_own_name(tmp_path):
     for name in ("a.xml", "b.xml"):
         path = tmp_path / name

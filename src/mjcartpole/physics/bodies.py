@@ -54,10 +54,7 @@ def starting_state(cartpole: CartPole, task: Task) -> Vector:
 
 
 def data_at_zero(model: mujoco.MjModel, data: mujoco.MjData | None = None) -> mujoco.MjData:
-    """Return where all bodies are when all coordinates are 0, which a `ref` can move elsewhere.
-
-    Written into `data` of the model, if some are given: to make them costs as much as to compile.
-    """
+    """Return, in `data` or new ones, where bodies are at coordinates 0, which a `ref` can move."""
     data = mujoco.MjData(model) if data is None else data
     data.qpos[:] = 0.0
     mujoco.mj_kinematics(model, data)

@@ -28,35 +28,25 @@ _NAMES_FILE: Final = re.compile(r"file\w*\s*=")
 """In the text of a document that depends on other files: includes, meshes, attached models."""
 
 
-def build(text: str, name: str, path: Path | None = None) -> CartPole:
+def build(source: str | Document, name: str, path: Path | None = None) -> CartPole:
     """Return the cart-pole that a document describes; shared by all, so nobody may change it.
 
+    `source` is its text, or what was read as such and had no more than values changed since;
     `name` is what a person calls it, `path` the file that it was read from, if there is one.
 
     Raises:
         ModelError: It does not load, or is no cart-pole.
     """
+    text = source if isinstance(source, str) else source.text
+    names_files = _NAMES_FILE.search(text)
 
     def make() -> CartPole:
+        if isinstance(source, Document) and not names_files:
+            return find_parts(name, text, compile_document(source, name))
         folder, called = (path.parent, str(path)) if path else (Path(), name)
         return find_parts(name, *compile_text(text, called, folder))
 
-    if _NAMES_FILE.search(text):
-        return make()
-    return dataclasses.replace(remembered(text, make), name=name)
-
-
-def build_edited(document: Document, name: str) -> CartPole:
-    """Return as `build` the cart-pole of a document that was whole and had numbers changed since.
-
-    Raises:
-        ModelError: It does not compile any more, or is no cart-pole.
-    """
-    text = document.text
-    if _NAMES_FILE.search(text):
-        return build(text, name)
-    made = remembered(text, lambda: find_parts(name, text, compile_document(document, name)))
-    return dataclasses.replace(made, name=name)
+    return make() if names_files else dataclasses.replace(remembered(text, make), name=name)
 
 
 def compile_text(

@@ -66,9 +66,9 @@ def compile_document(document: Document, name: str) -> mujoco.MjModel:
 
 def _is_plain(document: Document) -> bool:
     elements = list(document.root.walk())
-    return len(elements) <= _MOST_PLAIN and all(
-        each.tag in _PLAIN and not any(map(_COSTLY.fullmatch, each.attributes)) for each in elements
-    )
+    attributes = {name for each in elements for name in each.attributes}
+    is_plain = len(elements) <= _MOST_PLAIN and {each.tag for each in elements} <= _PLAIN
+    return is_plain and not any(map(_COSTLY.fullmatch, attributes))
 
 
 def _try(text: str, name: str) -> None:

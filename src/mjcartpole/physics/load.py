@@ -229,15 +229,10 @@ def same_model(a: mujoco.MjModel, b: mujoco.MjModel) -> bool:
 
     Where their files lie makes no difference.
     """
-    if _bytes_of(a) == _bytes_of(b):
-        return True
-    return dict(_values_of(a)) == dict(_values_of(b))
-
-
-def _bytes_of(model: mujoco.MjModel) -> bytes:
-    buffer = np.empty(mujoco.mj_sizeModel(model), np.uint8)
-    mujoco.mj_saveModel(model, None, buffer)
-    return buffer.tobytes()
+    saved = [np.empty(mujoco.mj_sizeModel(model), np.uint8) for model in (a, b)]
+    for model, buffer in zip((a, b), saved, strict=True):
+        mujoco.mj_saveModel(model, None, buffer)
+    return np.array_equal(saved[0], saved[1]) or dict(_values_of(a)) == dict(_values_of(b))
 
 
 _NO_VALUES: Final = {"nbuffer", "signature"}

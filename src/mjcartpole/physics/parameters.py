@@ -18,7 +18,7 @@ from mjcartpole.physics.bodies import cart_bodies, data_at_zero, mass_of, pole_b
 from mjcartpole.physics.cartpole import CartPole, Vector
 from mjcartpole.physics.dry_friction import DryFriction
 from mjcartpole.physics.equations import Parameters
-from mjcartpole.physics.structure import directions, push
+from mjcartpole.physics.structure import cross, directions, push
 
 TILT: Final = 1e-14
 """Sine of an angle that rounding alone can leave between two axes; anything more is a tilt."""
@@ -235,7 +235,7 @@ def pole_of(cartpole: CartPole, pole: int = 0) -> _Pole:
         com += model.body_mass[body] * (place - places[0]) / max(mass, mujoco.mjMINVAL)
     inertia = sum(moments)
     for body, place in zip(bodies, places, strict=True):
-        arm = np.cross(axis, place - com)
+        arm = cross(axis, place - com)
         inertia += float(model.body_mass[body] * (arm @ arm))
     return _Pole(mass, com - model.jnt_pos[hinge], inertia)
 

@@ -4,7 +4,7 @@ import functools
 import itertools
 from collections.abc import Iterator
 from operator import attrgetter
-from typing import Any, Final
+from typing import Final
 
 import mujoco
 import numpy as np
@@ -46,19 +46,18 @@ def check_numbers(name: str, model: mujoco.MjModel) -> None:
             raise ModelError(f"{name} {words}")
     if not model.opt.timestep > 0:
         raise ModelError(f"{name} has a timestep of {model.opt.timestep:g} s; use 0.02")
-    for part in ("model", "opt", "stat"):
-        owner = _part(model, part)
-        fields = _float_fields(part)
-        if np.isfinite(np.concatenate(attrgetter(*fields)(owner), axis=None)).all():
-            continue
-        for field in fields:
-            values = getattr(owner, field)
-            bad = np.isnan(values) if field in _MAY_BE_INFINITE else ~np.isfinite(values)
-            if bad.any():
-                raise ModelError(
-                    f"{name} has a number that is NaN or infinite ({field} of MuJoCo's {part}); "
-                    "look for nan, inf and numbers far too large"
-                )
+    fields = _float_fields()
+    if np.isfinite(np.concatenate(attrgetter(*fields)(model), axis=None)).all():
+        return
+    for field in fields:
+        values = attrgetter(field)(model)
+        bad = np.isnan(values) if field in _MAY_BE_INFINITE else ~np.isfinite(values)
+        if bad.any():
+            part, _, named = field.rpartition(".")
+            raise ModelError(
+                f"{name} has a number that is NaN or infinite ({named} of MuJoCo's "
+                f"{part or 'model'}); look for nan, inf and numbers far too large"
+            )
 
 
 def _amounts(model: mujoco.MjModel) -> Iterator[tuple[int, int, str]]:
@@ -102,18 +101,9 @@ def check_motion(cartpole: CartPole, data: mujoco.MjData) -> None:
 
 
 @functools.cache
-def _float_fields(part: str) -> tuple[str, ...]:
-    """Return the names of all numbers in a part of a model, whatever this MuJoCo has there."""
-    owner = _part(mujoco.MjModel.from_xml_string("<mujoco/>"), part)
-    names = [name for name in dir(owner) if not name.startswith("_")]
-    return tuple(name for name in names if _holds_floats(getattr(owner, name)))
-
-
-def _part(model: mujoco.MjModel, part: str) -> Any:  # noqa: ANN401 - MuJoCo has no types
-    return model if part == "model" else getattr(model, part)
-
-
-def _holds_floats(value: object) -> bool:
-    if isinstance(value, float):
-        return True
-    return isinstance(value, np.ndarray) and np.issubdtype(value.dtype, np.floating)
+def _float_fields() -> tuple[str, ...]:
+    """Return where a model has numbers, such as "opt.gravity", whatever this MuJoCo has there."""
+    model = mujoco.MjModel.from_xml_string("<mujoco/>")
+    owners = {"": model, "opt.": model.opt, "stat.": model.stat}
+    names = [part + name for part, owner in owners.items() for name in dir(owner)]
+    return tuple(name for name in names if np.asarray(attrgetter(name)(model)).dtype.kind == "f")

@@ -10,9 +10,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mjcartpole.errors import ConfigError, ModelSyntaxError
+from mjcartpole.physics.edit.document import Document
 from mjcartpole.physics.edit.edits import edit_document
+from mjcartpole.physics.edit.semantic_edits import apply_meanings
 from mjcartpole.physics.equations import Parameters
-from mjcartpole.physics.load import load_model, same_model
+from mjcartpole.physics.load import load_model, model_names, same_model
 from mjcartpole.physics.parameters import differences, read_parameters
 from mjcartpole.physics.unmodelled_effects import beyond_equations
 from nightly import examples
@@ -291,3 +293,31 @@ def test_what_the_document_does_not_allow_is_refused(old, new, edits, said):
     with pytest.raises(ConfigError, match=re.escape(said)) as caught:
         edit_document(text, edits)
     assert "\n" not in str(caught.value)
+
+
+# --- in one step --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", model_names())
+def test_in_one_step_is_the_same_as_step_by_step(name):
+    cartpole = load_model(name)
+    of_pole = [f"pole{n + 1}" if cartpole.poles > 1 else "pole" for n in range(cartpole.poles)]
+    edits = {f"{pole}.length": 0.7 for pole in of_pole} | {f"{pole}.mass": 0.3 for pole in of_pole}
+    edits |= {"cart.mass": 0.8, "gravity": 5.0}
+    first, second = Document(cartpole.xml), Document(cartpole.xml)
+    apply_meanings(first, edits, name, in_one=True)
+    apply_meanings(second, edits, name, in_one=False)
+    assert first.text == second.text != cartpole.xml
+
+
+@pytest.mark.parametrize(
+    ("edits", "who"),
+    [
+        ({}, "cartpole with gravity=1e-310"),
+        ({"pole.mass": 1.2}, "cartpole"),
+        ({"pole.length": 1.2}, "the edited document"),
+    ],
+)
+def test_the_first_step_that_fails_says_why(edits, who):
+    with pytest.raises(ModelSyntaxError, match=f"^{who} is not a valid MJCF: number is too large"):
+        load_model("cartpole", {"gravity": 1e-310, **edits})

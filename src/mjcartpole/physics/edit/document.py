@@ -59,11 +59,9 @@ class Element:
 
     def walk(self) -> Iterator["Element"]:
         """Return the element and all in it, in the order of the document."""
-        waiting = [self]
-        while waiting:
-            element = waiting.pop()
-            yield element
-            waiting += reversed(element.children)
+        yield self
+        for child in self.children:
+            yield from child.walk()
 
     def find(self, tag: str) -> "list[Element]":
         """Return its children of a tag; those inside a <frame> count as its own."""
@@ -186,10 +184,8 @@ class Document:
             position = match.end()
 
     def _attributes_end(self, element: Element) -> int:
-        end = element.start + 1 + len(element.tag.encode())
-        for match in self._attributes(element):
-            end = match.end()
-        return end
+        ends = [match.end() for match in self._attributes(element)]
+        return ends[-1] if ends else element.start + 1 + len(element.tag.encode())
 
     def _tag_end(self, element: Element) -> int:
         return self._bytes.index(b">", self._attributes_end(element)) + 1

@@ -13,7 +13,7 @@ from typing import Final
 
 import numpy as np
 
-from mjcartpole.errors import ConfigError
+from mjcartpole.errors import ConfigError, ModelError
 from mjcartpole.physics.edit.document import Document
 from mjcartpole.physics.edit.element_path import find_element, known_attributes, label_of
 from mjcartpole.physics.edit.schema import attributes_of, did_you_mean
@@ -136,7 +136,12 @@ def edit_document(
     meanings = {key: meaning_of(key) for key in edits}
     values = {key: found.check(key, edits[key]) for key, found in meanings.items() if found}
     if values:
-        apply_meanings(edited, values, name)
+        try:
+            apply_meanings(edited, values, name, in_one=True)
+        except (ConfigError, ModelError):
+            # The first step that fails is to say why.
+            edited = Document(document)
+            apply_meanings(edited, values, name, in_one=False)
     _apply_elements(edited, {key: edits[key] for key in sorted(edits) if key not in values})
     return edited.text
 

@@ -211,10 +211,7 @@ class _Stretch:
                 "pole.length cannot be set: the pole's centre of mass is at the hinge, so it has "
                 "no direction"
             )
-        self.root, self.foot = (
-            int(self.model.jnt_bodyid[hinge]),
-            np.array(self.model.jnt_pos[hinge]),
-        )
+        self.root, self.foot = int(self.model.jnt_bodyid[hinge]), self.model.jnt_pos[hinge].copy()
         along = com / distance
         axis = int(np.abs(along).argmax())
         self.axis = axis if abs(along[axis]) > 1 - 1e-15 else None

@@ -11,8 +11,8 @@ import numpy as np
 
 from mjcartpole import task
 from mjcartpole.errors import ConfigError
-from mjcartpole.physics.bodies import cart_bodies, mass_of
-from mjcartpole.physics.build import build, build_edited
+from mjcartpole.physics.bodies import cart_bodies, mass_of, pole_bodies
+from mjcartpole.physics.build import build
 from mjcartpole.physics.cartpole import CartPole, Vector
 from mjcartpole.physics.edit.document import Document, Element
 from mjcartpole.physics.edit.element_path import find_element
@@ -75,6 +75,9 @@ _OF_POLE: Final = ("pole.", "hinge.")
 _NUMBERED: Final = re.compile(r"^(pole|hinge)([1-9]\d*)\.")
 """Of one of several poles."""
 
+_USUAL: Final = (1e-4, 1e4)
+"""Lengths and masses, SI units, of which no product is near what MuJoCo refuses (1e-15)."""
+
 _JOINT_ATTRIBUTES: Final = {
     "damping": "damping",
     "friction": "frictionloss",
@@ -100,8 +103,12 @@ def _with_number(name: str, number: object) -> str:
     return name.replace(".", f"{number}.", 1) if name.startswith(_OF_POLE) else name
 
 
-def apply_meanings(document: Document, values: Mapping[str, float], name: str) -> None:
+def apply_meanings(
+    document: Document, values: Mapping[str, float], name: str, in_one: bool
+) -> None:
     """Make edits by meaning, checked values by name, in the document of a cart-pole.
+
+    `in_one` step where that is the same, for all but the words of an error, as if each was tried.
 
     Raises:
         ConfigError: The document leaves no room for an edit; the reason is said.
@@ -110,20 +117,20 @@ def apply_meanings(document: Document, values: Mapping[str, float], name: str) -
     cartpole = build(document.text, name)
     whole, by_pole = _sort_by_pole(values, cartpole.poles)
     _edit_options(document, cartpole.model, whole)
-    parts = Parts(document, cartpole)
+    parts = Parts(document, cartpole, in_one and max(values.values()) < _USUAL[1])
     _edit_joint(parts, cartpole.slider, "rail", whole)
     if "force" in whole:
         _edit_force(parts, whole["force"])
     if "cart.mass" in whole:
         set_mass(parts, cart_bodies(cartpole), "cart", whole["cart.mass"])
-    centres = [_edit_pole(document, cartpole, pole, wanted) for pole, wanted in enumerate(by_pole)]
+    centres = [_edit_pole(parts, pole, wanted) for pole, wanted in enumerate(by_pole)]
     name += f" with {', '.join(f'{key}={value:g}' for key, value in values.items())}"
-    after = build_edited(document, name)
+    after = build(document, name)
     _check_outcome(_found(after), whole)
     for pole, wanted in enumerate(by_pole):
-        found = _found_of_joint(after, after.hinges[pole], "hinge")
-        _check_outcome({"pole.mass": pole_of(after, pole).mass, **found}, wanted)
-        _check_centre(after, pole, centres[pole])
+        found, rigid = _found_of_joint(after, after.hinges[pole], "hinge"), pole_of(after, pole)
+        _check_outcome({"pole.mass": rigid.mass, **found}, wanted)
+        _check_centre(rigid.com, centres[pole])
 
 
 def _sort_by_pole(
@@ -153,18 +160,20 @@ def _sort_by_pole(
     return whole, by_pole
 
 
-def _edit_pole(
-    document: Document, before: CartPole, pole: int, values: Mapping[str, float]
-) -> Vector:
+def _edit_pole(parts: Parts, pole: int, values: Mapping[str, float]) -> Vector:
     """Make the edits of one pole; returns where its centre of mass must then be, from the hinge."""
-    wanted, longer = pole_of(before, pole), 1.0
-    if values:
-        _edit_joint(Parts(document, before), before.hinges[pole], "hinge", values)
+    before, longer = parts.cartpole, 1.0
+    wanted = pole_of(before, pole)
+    _edit_joint(parts, before.hinges[pole], "hinge", values)
     if "pole.length" in values:
-        longer = set_length(Parts(document, before), values["pole.length"], pole)
+        longer = set_length(parts, values["pole.length"], pole)
     if "pole.length" in values or "pole.mass" in values:
-        stretched = build_edited(document, before.name)
-        set_pole_mass(Parts(document, stretched), values.get("pole.mass", wanted.mass), pole)
+        mass = values.get("pole.mass", wanted.mass)
+        sizes = wanted.mass, mass, values.get("pole.length", 1.0)
+        usual = all(_USUAL[0] < size < _USUAL[1] for size in sizes)
+        if not (parts.in_one and usual and parts.weigh_as_written(pole_bodies(before, pole))):
+            parts = Parts(parts.document, build(parts.document, before.name))
+        set_pole_mass(parts, mass, pole)
     return longer * wanted.com
 
 
@@ -220,9 +229,8 @@ def _edit_force(parts: Parts, force: float) -> None:
         _set_first(parts.document, element, "gear", gear)
 
 
-def _check_centre(cartpole: CartPole, pole: int, wanted: Vector) -> None:
+def _check_centre(found: Vector, wanted: Vector) -> None:
     """Refuse a pole of which not all has become longer in the same proportion."""
-    found = pole_of(cartpole, pole).com
     if np.abs(found - wanted).max() > 1e-9 * np.abs(wanted).max():
         raise ConfigError(
             f"pole.length cannot be set: the centre of mass would be {np.linalg.norm(found):g} m "

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from functools import lru_cache
 
 import mujoco
 
@@ -23,16 +24,21 @@ def number_text(value: float, written: str = "") -> str:
     return str(int(value)) if whole else repr(float(value))
 
 
+_read = lru_cache(maxsize=4)(mujoco.MjSpec.from_string)
+
+
 class Parts:
     """The elements of a document that stand for parts of its compiled model.
 
     Attributes:
         document: The document; nothing may be put into it while this is in use.
         cartpole: What it compiles to, but for numbers that were edited since.
+        in_one: Whether what was edited so far is taken for valid until all edits are made.
     """
 
-    def __init__(self, document: Document, cartpole: CartPole) -> None:
+    def __init__(self, document: Document, cartpole: CartPole, in_one: bool = False) -> None:
         self.document, self.cartpole, self._model = document, cartpole, cartpole.model
+        self.in_one = in_one
         worlds = [child for child in document.root.children if child.tag == "worldbody"]
         self._bodies = [each for world in worlds for each in world.walk() if each.tag == "body"]
 
@@ -82,7 +88,8 @@ class Parts:
                 "of them are in the document; edit by element"
             )
         try:
-            spec = mujoco.MjSpec.from_string(self.document.text)
+            # No geom that is asked for was edited before.
+            spec = _read(self.cartpole.xml if self.in_one else self.document.text)
         except ValueError as error:
             raise invalid("the edited document", error) from error
         whole = [geom for each in spec.bodies for geom in each.geoms]
@@ -100,6 +107,11 @@ class Parts:
         said = [each.attributes.get("inertiafromgeom", "") for each in compilers]
         from_geoms = [each for each in said if each][-1:] == ["true"]
         return found[0] if found and not from_geoms else None
+
+    def weigh_as_written(self, bodies: Sequence[int]) -> bool:
+        """Return whether each of some bodies has the mass that its own <inertial> says."""
+        whole = any("settotalmass" in each.attributes for each in self.document.root.children)
+        return not whole and all(self.inertial(body) is not None for body in bodies)
 
     def put(self, element: Element, name: str, values: Sequence[float]) -> None:
         """Write numbers into an attribute; those that do not change keep their spelling.
