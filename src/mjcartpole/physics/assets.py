@@ -99,7 +99,7 @@ def find_assets(
     """
     compilers = [each.attributes for each in _compilers(document)]
     assets = []
-    for element, origin in zip(document.root.walk(), origins, strict=True):
+    for element, origin in zip(document.elements, origins, strict=True):
         for attribute, name in element.attributes.items():
             if attribute.startswith("file") and name and element.tag != "include":
                 paths = _paths(element.tag, name, folders, compilers, origin)
@@ -170,7 +170,7 @@ def _set_folders(document: Document, folders: Folders | None) -> None:
 
 
 def _compilers(document: Document) -> list[Element]:
-    return [each for each in document.root.walk() if each.tag == "compiler"]
+    return [each for each in document.elements if each.tag == "compiler"]
 
 
 def name_by_content(path: Path, content: str | None = None) -> str:

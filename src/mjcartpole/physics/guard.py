@@ -65,7 +65,7 @@ def compile_document(document: Document, name: str) -> mujoco.MjModel:
 
 
 def _is_plain(document: Document) -> bool:
-    elements = list(document.root.walk())
+    elements = document.elements
     attributes = {name for each in elements for name in each.attributes}
     is_plain = len(elements) <= _MOST_PLAIN and {each.tag for each in elements} <= _PLAIN
     return is_plain and not any(map(_COSTLY.fullmatch, attributes))

@@ -145,7 +145,7 @@ class _Reader:
         start, end = (0, len(content)) if origin is None else document.content(document.root)
         pieces: list[bytes] = []
         origins: list[Path | None] = []
-        for element in document.root.walk():
+        for element in document.elements:
             if element.start < start:
                 continue  # The root of an included file, or what an <include> holds.
             if element.tag != "include":

@@ -21,7 +21,7 @@ TEXT = """<?xml version='1.0'?>
 
 
 def the(document, tag):
-    (found,) = [element for element in document.root.walk() if element.tag == tag]
+    (found,) = [element for element in document.elements if element.tag == tag]
     return found
 
 
@@ -33,7 +33,7 @@ def test_attributes_by_the_thousand_are_refused_before_they_take_time():
 
 def test_elements_are_found_with_their_attributes():
     document = Document(TEXT)
-    assert [each.tag for each in document.root.walk()] == [
+    assert [each.tag for each in document.elements] == [
         "mujoco",
         "option",
         "worldbody",
@@ -121,7 +121,7 @@ LENIENT = """<!---- ä -- <joint name="not me"/> --><mujoco><!----> <a b="1"/> <
 
 def test_comments_as_people_write_them_stay():
     document = Document(LENIENT)
-    assert [each.tag for each in document.root.walk()] == ["mujoco", "a", "worldbody"]
+    assert [each.tag for each in document.elements] == ["mujoco", "a", "worldbody"]
     document.set(the(document, "a"), "b", "2")
     document.set(document.insert(document.root, "size"), "njmax", "1")
     document.set(the(document, "worldbody"), "name", "w")

@@ -57,12 +57,6 @@ class Element:
             return self.attributes.get("class", "main")
         return self.attributes.get("name", "")
 
-    def walk(self) -> Iterator["Element"]:
-        """Return the element and all in it, in the order of the document."""
-        yield self
-        for child in self.children:
-            yield from child.walk()
-
     def find(self, tag: str) -> "list[Element]":
         """Return its children of a tag; those inside a <frame> count as its own."""
         found = []
@@ -79,10 +73,11 @@ class Document:
 
     Attributes:
         root: The outermost element.
+        elements: All, in the order of the document.
     """
 
     root: Element
-    _elements: list[Element]
+    elements: list[Element]
 
     def __init__(self, text: str) -> None:
         """Find the elements of a text.
@@ -125,7 +120,7 @@ class Document:
         space = self._indentation(position) if position else ""
         self._replace(end, end, f"{space}<{tag}/>")
         self._parse(self.text)
-        return next(each for each in self._elements if each.start == end + len(space))
+        return next(each for each in self.elements if each.start == end + len(space))
 
     def content(self, element: Element) -> tuple[int, int]:
         """Return where an element's content begins and ends; before the text is edited."""
@@ -141,7 +136,7 @@ class Document:
 
     def _parse(self, text: str) -> None:
         stack: list[Element] = []
-        self._elements = []
+        self.elements = []
         parser = expat.ParserCreate()
 
         def start(tag: str, attributes: dict[str, str]) -> None:
@@ -152,8 +147,8 @@ class Document:
             else:
                 parent.children.append(element)
             stack.append(element)
-            self._elements.append(element)
-            if len(self._elements) > MOST_ELEMENTS or len(stack) > DEEPEST:
+            self.elements.append(element)
+            if len(self.elements) > MOST_ELEMENTS or len(stack) > DEEPEST:
                 raise ModelSyntaxError(
                     f"it has more than {MOST_ELEMENTS} elements, or more than {DEEPEST} levels of "
                     "them; a cart-pole needs a few dozen"
@@ -200,7 +195,7 @@ class Document:
         new = text.encode("utf-8")
         self._bytes = self._bytes[:start] + new + self._bytes[end:]
         moved = len(new) - (end - start)
-        for element in reversed(self._elements):
+        for element in reversed(self.elements):
             if element.start < end:
                 break
             element.start += moved

@@ -153,7 +153,7 @@ def describe_edits(before: str, after: str) -> list[str]:
         Lines such as 'geom:pole.size: 0.03 → 0.05'; where elements were added, one line says so.
     """
     lines = []
-    old, new = list(Document(before).root.walk()), list(Document(after).root.walk())
+    old, new = Document(before).elements, Document(after).elements
     if [element.tag for element in old] != [element.tag for element in new]:
         return [f"other elements: {len(old)} before, {len(new)} after"]
     for a, b in zip(old, new, strict=True):

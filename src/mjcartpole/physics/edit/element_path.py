@@ -72,7 +72,7 @@ def _step(document: Document, key: str, inside: Element | None, rest: str) -> tu
 def _candidates(document: Document, inside: Element | None, tag: str) -> list[Element]:
     if inside is not None:
         return inside.find(tag)
-    found = [element for element in document.root.walk() if element.tag == tag]
+    found = [element for element in document.elements if element.tag == tag]
     return found if tag == "default" else [each for each in found if not _in_defaults(each)]
 
 
@@ -123,7 +123,7 @@ def _missing(document: Document, key: str, inside: Element | None, tag: str) -> 
         if tag in schema().children[section].children:
             outer, _ = _step(document, key, None, section)
             return document.insert(outer, tag)
-    there = {element.tag for element in document.root.walk()}
+    there = {element.tag for element in document.elements}
     raise ConfigError(f"{key!r}: the document has no <{tag}>, {did_you_mean(tag, there)}")
 
 

@@ -39,8 +39,7 @@ class Parts:
     def __init__(self, document: Document, cartpole: CartPole, in_one: bool = False) -> None:
         self.document, self.cartpole, self._model = document, cartpole, cartpole.model
         self.in_one = in_one
-        worlds = [child for child in document.root.children if child.tag == "worldbody"]
-        self._bodies = [each for world in worlds for each in world.walk() if each.tag == "body"]
+        self._bodies = [each for each in document.elements if each.tag == "body"]
 
     def body(self, index: int) -> Element:
         """Return the element of a body.
