@@ -10,7 +10,9 @@ from typing import Any
 import numpy as np
 from numba.extending import register_jitable
 
-from mjcartpole.learning.stepping import AnyPhysics, Rules, State, _for_each, advance
+from mjcartpole.learning.kinds import Rules, State
+from mjcartpole.learning.linking import AnyPhysics, for_each
+from mjcartpole.learning.stepping import advance
 from mjcartpole.physics.cartpole_v1 import cartpole_v1_moved
 
 
@@ -30,7 +32,7 @@ def _foresee_nothing(physics: AnyPhysics, state: State) -> Any:
     return None
 
 
-@_for_each(_foresee_nothing, _foresee_nothing, GymPhysics=_foresee_gym)
+@for_each(_foresee_nothing, _foresee_nothing, GymPhysics=_foresee_gym)
 def foresee(physics: AnyPhysics, state: State) -> Any:
     """Return what is known of the next step whatever the action, for `go_on`."""
     raise NotImplementedError  # Numba takes one of those above; so below.
@@ -49,7 +51,7 @@ def _go_on(
     return advance(physics, rules, state, action), None
 
 
-@_for_each(_go_on, _go_on, GymPhysics=_go_on_gym)
+@for_each(_go_on, _go_on, GymPhysics=_go_on_gym)
 def go_on(
     physics: AnyPhysics, rules: Rules, state: State, action: int, ahead: Any
 ) -> tuple[State, Any]:

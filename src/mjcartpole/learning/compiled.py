@@ -2,12 +2,14 @@
 
 import logging
 from collections.abc import Callable, Iterator
-from typing import Final, NamedTuple, Self
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
 from numba.core import config, event
 
+from mjcartpole.disturbances.contexts import Chance
+from mjcartpole.disturbances.disturbances import NONE, Disturbances
 from mjcartpole.envs.backend import Backend
 from mjcartpole.errors import SimulationError
 from mjcartpole.integrator import Integrator
@@ -16,17 +18,17 @@ from mjcartpole.learning.compiling import compiling
 from mjcartpole.learning.discretizer import Discretizer, Grid
 from mjcartpole.learning.episodes import EpisodeLog
 from mjcartpole.learning.fitted import Fitted
+from mjcartpole.learning.kinds import Rules
 from mjcartpole.learning.learner import Learner
+from mjcartpole.learning.linking import link
 from mjcartpole.learning.loop import in_episode
 from mjcartpole.learning.policy import Policy
-from mjcartpole.learning.stepping import GymPhysics, MujocoPhysics, Physics, Rules, link
-from mjcartpole.physics.bodies import starting_state
+from mjcartpole.learning.worlds import Worlds
 from mjcartpole.physics.cartpole import CartPole
-from mjcartpole.physics.cartpole_v1 import FORCE
 from mjcartpole.physics.library import libmujoco
 from mjcartpole.physics.load import ModelLike, load_model
-from mjcartpole.physics.simulation import Simulation, check_sane
-from mjcartpole.task import CARTPOLE_V1, Task, state_names
+from mjcartpole.physics.simulation import check_sane
+from mjcartpole.task import CARTPOLE_V1, Task
 
 CHUNK_STEPS: Final = 50_000
 """Physics steps between two looks at what else is to be done: a twentieth of a second in MuJoCo."""
@@ -59,6 +61,7 @@ class CompiledLoop:
         model: ModelLike,
         integrator: Integrator,
         task: Task = CARTPOLE_V1,
+        disturbances: Disturbances = NONE,
         fitted: Fitted | None = None,
     ) -> None:
         """Load the model.
@@ -68,19 +71,18 @@ class CompiledLoop:
             model: See `load_model`; for backend mujoco.
             integrator: See `Simulation`; for backend mujoco.
             task: The rules.
+            disturbances: What is added; not to a fitted model, which is none of them.
             fitted: Plays in this model of the world instead of in the world.
 
         Raises:
             ModelError: The model cannot be used.
+            ConfigError: A disturbance makes no sense for it.
         """
-        self._simulation = (
-            Simulation(load_model(model), integrator) if backend == "mujoco" else None
-        )
-        self._memory = _Memory.of(self._simulation, task)
-        self._physics = _physics(self._simulation, self._memory, task, fitted)
+        cartpole = load_model(model) if backend == "mujoco" else None
+        self._worlds = Worlds(cartpole, integrator, task, NONE if fitted else disturbances, fitted)
         self._task, self._rules = task, _rules(task)
-        size = self._simulation.size if self._simulation else len(state_names())
-        self._chunk = _control_steps(self._simulation)
+        size = self._worlds.size
+        self._chunk = CHUNK_STEPS if cartpole is None else -(-CHUNK_STEPS // cartpole.substeps)
         limit = task.time_limit
         self._scratch = kernels.Scratch(
             states=np.zeros(limit + 1, np.int64),
@@ -97,6 +99,7 @@ class CompiledLoop:
         env_rng: np.random.Generator,
         log: EpisodeLog,
         numbers: range,
+        chance: Chance | None = None,
     ) -> Iterator[int]:
         """Do what `learn_episodes` does, chunk by chunk.
 
@@ -106,6 +109,7 @@ class CompiledLoop:
             env_rng: Draws the starting states.
             log: Takes the episodes; it holds those before `numbers`.
             numbers: Which episodes, counted from 0: they decide what the schedules give.
+            chance: Draws the disturbances, where there are some.
 
         Yields:
             The number of episodes in the log.
@@ -117,7 +121,7 @@ class CompiledLoop:
         while number < numbers.stop:
             self._scratch.finished[0] = number
             try:
-                self._learn(learner, discretizer, env_rng, log, number, numbers.stop)
+                self._learn(learner, discretizer, env_rng, log, number, numbers.stop, chance)
             finally:
                 # A signal that came meanwhile is raised before `_run` can return anything.
                 number = int(self._scratch.finished[0])
@@ -131,9 +135,10 @@ class CompiledLoop:
         discretizer: Discretizer,
         env_rng: np.random.Generator,
         log: EpisodeLog,
+        chance: Chance | None = None,
     ) -> None:
         """Compile what `learn` runs, or load it from the cache; nothing is learned."""
-        self._learn(learner, discretizer, env_rng, log, 0, 0)
+        self._learn(learner, discretizer, env_rng, log, 0, 0, chance)
 
     def _learn(
         self,
@@ -143,24 +148,35 @@ class CompiledLoop:
         log: EpisodeLog,
         start: int,
         stop: int,
+        chance: Chance | None,
     ) -> None:
-        _run(
-            kernels.learn_chunk(learner.method, self._task.reward),
-            self._physics,
-            self._rules,
-            _arrays(discretizer.grid),
-            learner.p,
-            learner.memory,
-            (env_rng, learner.rng),
-            (start, stop, learner.episodes),
-            self._chunk,
-            log.storage,
-            learner.visits,
-            self._scratch,
-        )
+        kernel = kernels.learn_chunk(learner.method, self._task.reward)
+        left = self._chunk
+        for first, last in self._worlds.parts(start, stop):
+            _run(
+                kernel,
+                self._worlds.physics(chance, first),
+                self._rules,
+                _arrays(discretizer.grid),
+                learner.p,
+                learner.memory,
+                (env_rng, learner.rng),
+                (first, last, learner.episodes),
+                left,
+                log.storage,
+                learner.visits,
+                self._scratch,
+            )
+            left -= int(log.storage.steps[first]) if self._worlds.vary and last > first else 0
+            if self._scratch.finished[0] != last or left <= 0:
+                return
 
     def play(
-        self, policy: Policy, starts: np.random.Generator | npt.NDArray[np.float64], episodes: int
+        self,
+        policy: Policy,
+        starts: np.random.Generator | npt.NDArray[np.float64],
+        episodes: int,
+        chance: Chance | None = None,
     ) -> EpisodeLog:
         """Play greedy episodes, as `play_episode` does.
 
@@ -168,18 +184,21 @@ class CompiledLoop:
             policy: Acts.
             starts: Draws the starting states, or has them as rows.
             episodes: How many.
+            chance: Draws the disturbances, where there are some.
 
         Raises:
             SimulationError: The physics diverged; names episode and step.
         """
         log = EpisodeLog(episodes)
         grid = _arrays(policy.discretizer.grid)
-        common = (self._physics, self._rules, grid, policy.tiles, policy.choices, starts)
+        common = (self._rules, grid, policy.tiles, policy.choices, starts)
         while len(log) < episodes:
+            first, last = self._worlds.parts(len(log), episodes)[0]
             number = _run(
                 kernels.play_chunk(self._task.reward),
+                self._worlds.physics(chance, first),
                 *common,
-                (len(log), episodes),
+                (first, last),
                 self._chunk,
                 log.storage,
                 self._scratch.failure,
@@ -194,56 +213,11 @@ class CompiledLoop:
         if steps < 0:
             return
         self._scratch.failure[0] = -1.0
-        assert self._simulation is not None
+        assert self._worlds.cartpole is not None
         try:
-            check_sane(tuple(state), self._simulation.cartpole.name)
+            check_sane(tuple(state), self._worlds.cartpole.name)
         except SimulationError as error:
             raise in_episode(error, number, int(steps)) from error
-
-
-class _Memory(NamedTuple):
-    """Arrays that compiled code is given the addresses of; see `MujocoPhysics`."""
-
-    joints: npt.NDArray[np.int64]
-    seen: npt.NDArray[np.float64]
-    moved: npt.NDArray[np.float64]
-    start: npt.NDArray[np.float64]
-
-    @classmethod
-    def of(cls, simulation: Simulation | None, task: Task) -> Self:
-        if simulation is None:
-            return cls(np.zeros(0, np.int64), *(np.zeros(0),) * 3)
-        joints = np.array(simulation.cartpole.joints, np.int64)
-        start = starting_state(simulation.cartpole, task)[0::2].copy()
-        return cls(joints, np.zeros(2 * joints.size), np.zeros(joints.size), start)
-
-
-def _physics(
-    simulation: Simulation | None, memory: _Memory, task: Task, fitted: Fitted | None = None
-) -> Physics:
-    if fitted is not None:
-        return fitted._replace(start=float(task.start_angle))
-    if simulation is None:
-        return GymPhysics(-FORCE, FORCE, float(task.start_angle))
-    cartpole, model, data = simulation.cartpole, simulation.model, simulation.data
-    left, right = cartpole.controls
-    return MujocoPhysics(
-        model=model._address,
-        data=data._address,
-        qpos=data.qpos.ctypes.data,
-        qvel=data.qvel.ctypes.data,
-        ctrl=data.ctrl.ctypes.data,
-        joints=memory.joints.ctypes.data,
-        n_joints=len(memory.joints),
-        left=left,
-        right=right,
-        timestep=float(model.opt.timestep),
-        substeps=cartpole.substeps,
-        explicit=simulation.integrator == "gym",
-        seen=memory.seen.ctypes.data,
-        moved=memory.moved.ctypes.data,
-        start=memory.start.ctypes.data,
-    )
 
 
 def _rules(task: Task) -> Rules:
@@ -255,11 +229,6 @@ def _rules(task: Task) -> Rules:
         time_limit=task.time_limit,
         turns=task.turns,
     )
-
-
-def _control_steps(simulation: Simulation | None) -> int:
-    """How many control steps make a chunk."""
-    return CHUNK_STEPS if simulation is None else -(-CHUNK_STEPS // simulation.cartpole.substeps)
 
 
 def _arrays(grid: Grid) -> Grid:

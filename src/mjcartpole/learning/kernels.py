@@ -21,22 +21,19 @@ from numba import types
 from numba.extending import register_jitable
 
 from mjcartpole import rewards, task
+from mjcartpole.disturbances import effects
 from mjcartpole.learning import ahead as looking_ahead
-from mjcartpole.learning import discretizer, episodes, fitted, stepping, tiles
+from mjcartpole.learning import discretizer, episodes, fitted, linking, stepping, tiles
 from mjcartpole.learning.ahead import foresee, go_on
 from mjcartpole.learning.discretizer import Grid
 from mjcartpole.learning.episodes import Columns
+from mjcartpole.learning.kinds import Floats, Physics, Rules, State
+from mjcartpole.learning.linking import F, compiled
 from mjcartpole.learning.methods import experience
 from mjcartpole.learning.methods.experience import Trajectory, Transition
 from mjcartpole.learning.stepping import (
-    F,
-    Floats,
-    Physics,
-    Rules,
-    State,
     advance,
     begin,
-    compiled,
     has_diverged,
     is_over,
     lean,
@@ -145,8 +142,8 @@ def _play_episode(
 ) -> Played:
     """Play an episode without learning, from a state in which the cart-pole is."""
     total, steps, over, terminated = 0.0, 0, False, False
+    s = _row_of(observe(physics, rules, state), grid)
     while not over:
-        s = _row_of(observe(physics, rules, state), grid)
         state = advance(physics, rules, state, _greedy(tiling, choices, s, grid.folding))
         terminated = is_over(rules, state)
         if terminated and has_diverged(state):
@@ -155,6 +152,7 @@ def _play_episode(
         total += pay(reward, rules, state, terminated)
         steps += 1
         over = terminated or steps == rules.time_limit
+        s = _row_of(observe(physics, rules, state), grid)
     return _ended(physics, rules, state, total, steps, terminated)
 
 
@@ -355,8 +353,10 @@ _SHARED: Final = (
     looking_ahead,
     cartpole_v1,
     discretizer,
+    effects,
     episodes,
     fitted,
+    linking,
     stepping,
     rewards,
     task,

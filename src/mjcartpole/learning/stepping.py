@@ -9,155 +9,35 @@ several poles are read from MuJoCo's own arrays where all of them count.
 Numba can keep in a cache on disk.
 """
 
-from collections.abc import Callable
-from pathlib import Path
-from typing import Any, NamedTuple, TypeAlias, TypeVar, cast
+from typing import Any
 
-import llvmlite.binding
 import numba
 import numpy as np
-import numpy.typing as npt
 from numba import types
-from numba.extending import intrinsic, overload, register_jitable
+from numba.extending import overload, register_jitable
 
 from mjcartpole import task
+from mjcartpole.disturbances import effects as effects_of
 from mjcartpole.learning import fitted
+from mjcartpole.learning.kinds import Floats, Rules, State
+from mjcartpole.learning.linking import AnyPhysics, compiled, floats, for_each, ints
 from mjcartpole.physics import cartpole_v1
 from mjcartpole.physics.simulation import FARTHEST_SANE, LARGEST_SANE
 from mjcartpole.rewards import Reward
-
-Floats = npt.NDArray[np.float64]
-F = TypeVar("F", bound=Callable[..., Any])
-
-State: TypeAlias = tuple[float, float, float, float]
-"""`(x, x_dot, theta, theta_dot)`; of several poles, the largest sizes of the last two."""
-
-
-class Rules(NamedTuple):
-    """A `Task` as compiled code sees it, but for its reward."""
-
-    x_limit: float
-    theta_limit: float
-    low: float
-    width: float
-    """Starting values lie in [low, low + width)."""
-    time_limit: int
-    turns: bool
-    """Whether angles count from -pi to pi."""
-
-
-class MujocoPhysics(NamedTuple):
-    """A `Simulation`, which must outlive this, as compiled code sees it.
-
-    Arrays are addresses here: Numba would count the references to each whenever this is passed on,
-    which costs as much as a tenth of a step.
-    """
-
-    model: int
-    """Of the mjModel."""
-    data: int
-    """Of the mjData, whose arrays follow."""
-    qpos: int
-    qvel: int
-    ctrl: int
-    joints: int
-    """int64 indices of the cart's, then of each pole's, shape (1 + poles,)."""
-    n_joints: int
-    """How many joints these are."""
-    left: float
-    right: float
-    """Controls of the two actions."""
-    timestep: float
-    substeps: int
-    explicit: bool
-    """Whether positions move by the old velocities (integrator `gym`)."""
-    seen: int
-    """Memory for the observation, shape (2 + 2 poles,)."""
-    moved: int
-    """Memory for positions, shape (1 + poles,)."""
-    start: int
-    """Where each joint starts, shape (1 + poles,); what is drawn is added."""
-
-
-class GymPhysics(NamedTuple):
-    """Gymnasium's CartPole-v1."""
-
-    left: float
-    right: float
-    """N."""
-    start: float
-    """Angle at the start, rad; what is drawn is added."""
-
-
-Physics: TypeAlias = MujocoPhysics | GymPhysics | fitted.Fitted
-AnyPhysics: TypeAlias = Any
-"""One of them, where Numba is to see one name for all."""
-
-
-def link(library: Path | None) -> str:
-    """Make MuJoCo's functions known to the compiler; returns why that failed, or nothing."""
-    if library is None:
-        return "libmujoco was not found in the mujoco package"
-    try:
-        llvmlite.binding.load_library_permanently(str(library))
-    except RuntimeError as error:
-        return f"libmujoco cannot be linked: {error}"
-    if llvmlite.binding.address_of_symbol("mj_step") is None:
-        return f"'{library}' has no mj_step"
-    return ""
-
-
-def compiled(function: F) -> F:
-    """Compile a function when it is first called, for others here to call."""
-    jitted: Any = numba.njit(error_model="numpy", nogil=True)(function)
-    return cast(F, jitted)
-
-
-def _array_at(kind: types.Type) -> Callable[[int], Any]:
-    """Return what makes an array of an address in compiled code."""
-
-    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        return builder.inttoptr(values[0], context.get_value_type(signature.return_type))
-
-    pointer: Any = types.CPointer(kind)  # type: ignore[no-untyped-call]
-
-    @intrinsic
-    def array_at(context: Any, address: Any) -> Any:
-        return pointer(address), generate
-
-    return cast(Callable[[int], Any], array_at)
-
-
-_floats, _ints = _array_at(types.float64), _array_at(types.int64)
-
 
 _max_abs, _wrapped = compiled(task.max_abs), compiled(task.wrapped)
 _carray = numba.carray  # type: ignore[attr-defined]
 register_jitable(cartpole_v1.cartpole_v1_moved)
 _cartpole_v1_step = compiled(cartpole_v1.cartpole_v1_step)
 
+_control_of = compiled(task.control_of)
+for _each in (effects_of._remember, effects_of._shoved, task.wrapped):
+    register_jitable(_each)
+_actuate, _sense = compiled(effects_of.actuate), compiled(effects_of.sense)
+_forget = compiled(effects_of.forget)
+
 _mj_step = types.ExternalFunction("mj_step", types.void(types.intp, types.intp))
 _mj_reset = types.ExternalFunction("mj_resetData", types.void(types.intp, types.intp))
-
-
-def _for_each(mujoco: F, gym: F, **others: Callable[..., Any]) -> Callable[[F], F]:
-    """Let Numba take one function of these for a stub, by the physics: its first argument.
-
-    Args:
-        mujoco: That for `MujocoPhysics`.
-        gym: That for all kinds without one of their own.
-        others: Those, by the names of the kinds.
-    """
-    functions: dict[str, Any] = {"MujocoPhysics": mujoco, **others}
-
-    def register(stub: F) -> F:
-        @overload(stub, strict=False)
-        def choose(physics: AnyPhysics, *others: object) -> Any:
-            return functions.get(physics.instance_class.__name__, gym)
-
-        return stub
-
-    return register
 
 
 # --- draw a starting state, and put a cart-pole there -------------------------------------------
@@ -165,8 +45,8 @@ def _for_each(mujoco: F, gym: F, **others: Callable[..., Any]) -> Callable[[F], 
 
 def _begin_mujoco(physics: AnyPhysics, rules: Rules, rng: np.random.Generator) -> State:
     _mj_reset(physics.model, physics.data)
-    joints, qpos, qvel = _ints(physics.joints), _floats(physics.qpos), _floats(physics.qvel)
-    start = _floats(physics.start)
+    joints, qpos, qvel = ints(physics.joints), floats(physics.qpos), floats(physics.qvel)
+    start = floats(physics.start)
     for index in range(physics.n_joints):
         qpos[joints[index]] = rules.low + rules.width * rng.random() + start[index]
         qvel[joints[index]] = rules.low + rules.width * rng.random()
@@ -181,7 +61,12 @@ def _begin_gym(physics: AnyPhysics, rules: Rules, rng: np.random.Generator) -> S
     return x, x_dot, theta, theta_dot
 
 
-@_for_each(_begin_mujoco, _begin_gym)
+def _begin_disturbed(physics: AnyPhysics, rules: Rules, rng: np.random.Generator) -> State:
+    _forget(physics.effects, floats(physics.memory))
+    return begin(physics.inner, rules, rng)
+
+
+@for_each(_begin_mujoco, _begin_gym, Disturbed=_begin_disturbed)
 def begin(physics: AnyPhysics, rules: Rules, rng: np.random.Generator) -> State:
     """Return a starting state, in which the cart-pole is put; nothing of its past remains.
 
@@ -192,7 +77,7 @@ def begin(physics: AnyPhysics, rules: Rules, rng: np.random.Generator) -> State:
 
 def _put_mujoco(physics: AnyPhysics, rules: Rules, start: Floats) -> State:
     _mj_reset(physics.model, physics.data)
-    joints, qpos, qvel = _ints(physics.joints), _floats(physics.qpos), _floats(physics.qvel)
+    joints, qpos, qvel = ints(physics.joints), floats(physics.qpos), floats(physics.qvel)
     for index in range(physics.n_joints):
         qpos[joints[index]], qvel[joints[index]] = start[2 * index], start[2 * index + 1]
     return _as_one_pole(physics, rules)
@@ -202,7 +87,12 @@ def _put_gym(physics: AnyPhysics, rules: Rules, start: Floats) -> State:
     return start[0], start[1], start[2], start[3]
 
 
-@_for_each(_put_mujoco, _put_gym)
+def _put_disturbed(physics: AnyPhysics, rules: Rules, start: Floats) -> State:
+    _forget(physics.effects, floats(physics.memory))
+    return put(physics.inner, rules, start)
+
+
+@for_each(_put_mujoco, _put_gym, Disturbed=_put_disturbed)
 def put(physics: AnyPhysics, rules: Rules, start: Floats) -> State:
     """Return a starting state in which the cart-pole is put; nothing of its past remains."""
     raise NotImplementedError
@@ -228,9 +118,14 @@ def _choose_start(physics: AnyPhysics, rules: Any, starts: Any, number: Any) -> 
 
 
 def _advance_mujoco(physics: AnyPhysics, rules: Rules, state: State, action: int) -> State:
-    joints, qpos, qvel = _ints(physics.joints), _floats(physics.qpos), _floats(physics.qvel)
-    moved, h = _floats(physics.moved), physics.timestep
-    _floats(physics.ctrl)[0] = physics.right if action == 1 else physics.left
+    floats(physics.ctrl)[0] = physics.right if action == 1 else physics.left
+    return _move_mujoco(physics, rules)
+
+
+@compiled
+def _move_mujoco(physics: AnyPhysics, rules: Rules) -> State:
+    joints, qpos, qvel = ints(physics.joints), floats(physics.qpos), floats(physics.qvel)
+    moved, h = floats(physics.moved), physics.timestep
     for _ in range(physics.substeps):
         for index in range(physics.n_joints):
             moved[index] = qpos[joints[index]] + h * qvel[joints[index]]
@@ -259,7 +154,38 @@ def _advance_linear(physics: AnyPhysics, rules: Rules, state: State, action: int
     return _linear_step(physics, state, action)
 
 
-@_for_each(_advance_mujoco, _advance_gym, Rod=_advance_rod, Linear=_advance_linear)
+def _push_mujoco(
+    physics: AnyPhysics, rules: Rules, state: State, push: float, force: float
+) -> State:
+    floats(physics.ctrl)[0] = _control_of(push, (physics.left, physics.right))
+    floats(physics.applied)[ints(physics.joints)[0]] = force
+    return _move_mujoco(physics, rules)
+
+
+def _push_gym(physics: AnyPhysics, rules: Rules, state: State, push: float, force: float) -> State:
+    total = _control_of(push, (physics.left, physics.right)) + force
+    return _cartpole_v1_step(state[0], state[1], state[2], state[3], total)
+
+
+@for_each(_push_mujoco, _push_gym)
+def push(physics: AnyPhysics, rules: Rules, state: State, push: float, force: float) -> State:
+    """Return the state one control step later, after a push from -1 to 1 and a force besides, N."""
+    raise NotImplementedError
+
+
+def _advance_disturbed(physics: AnyPhysics, rules: Rules, state: State, action: int) -> State:
+    given = 1.0 if action == 1 else -1.0
+    made, force = _actuate(physics.effects, floats(physics.memory), given, physics.rng)
+    return push(physics.inner, rules, state, made, force)
+
+
+@for_each(
+    _advance_mujoco,
+    _advance_gym,
+    Rod=_advance_rod,
+    Linear=_advance_linear,
+    Disturbed=_advance_disturbed,
+)
 def advance(physics: AnyPhysics, rules: Rules, state: State, action: int) -> State:
     """Return the state one control step later."""
     raise NotImplementedError
@@ -267,7 +193,7 @@ def advance(physics: AnyPhysics, rules: Rules, state: State, action: int) -> Sta
 
 @compiled
 def _as_one_pole(physics: AnyPhysics, rules: Rules) -> State:
-    joints, qpos, qvel = _ints(physics.joints), _floats(physics.qpos), _floats(physics.qvel)
+    joints, qpos, qvel = ints(physics.joints), floats(physics.qpos), floats(physics.qvel)
     theta, theta_dot = qpos[joints[1]], qvel[joints[1]]
     if physics.n_joints > 2:
         theta, theta_dot = _worst(qpos, physics, rules.turns), _worst(qvel, physics, False)
@@ -277,7 +203,7 @@ def _as_one_pole(physics: AnyPhysics, rules: Rules) -> State:
 @compiled
 def _worst(values: Any, physics: AnyPhysics, turns: bool) -> float:
     """Return the largest size among the poles' values, of angles that count from -pi to pi."""
-    joints, poles = _ints(physics.joints), _floats(physics.moved)
+    joints, poles = ints(physics.joints), floats(physics.moved)
     for index in range(1, physics.n_joints):
         value = values[joints[index]]
         poles[index - 1] = _wrapped(value) if turns else value
@@ -287,15 +213,35 @@ def _worst(values: Any, physics: AnyPhysics, turns: bool) -> float:
 # --- look at it ---------------------------------------------------------------------------------
 
 
-def _observe_mujoco(physics: AnyPhysics, rules: Rules, state: State) -> Any:
-    joints, seen = _ints(physics.joints), _floats(physics.seen)
-    qpos, qvel = _floats(physics.qpos), _floats(physics.qvel)
+def _read_mujoco(physics: AnyPhysics, rules: Rules, state: State, seen: Any) -> None:
+    joints, qpos, qvel = ints(physics.joints), floats(physics.qpos), floats(physics.qvel)
     for index in range(physics.n_joints):
         position = qpos[joints[index]]
-        if rules.turns and index > 0:
-            position = _wrapped(position)
-        seen[2 * index] = np.float64(np.float32(position))
-        seen[2 * index + 1] = np.float64(np.float32(qvel[joints[index]]))
+        seen[2 * index] = _wrapped(position) if rules.turns and index > 0 else position
+        seen[2 * index + 1] = qvel[joints[index]]
+
+
+def _read_gym(physics: AnyPhysics, rules: Rules, state: State, seen: Any) -> None:
+    seen[0], seen[1], seen[3] = state[0], state[1], state[3]
+    seen[2] = _wrapped(state[2]) if rules.turns else state[2]
+
+
+@for_each(_read_mujoco, _read_gym)
+def read(physics: AnyPhysics, rules: Rules, state: State, seen: Any) -> None:
+    """Write the state as rules have it."""
+    raise NotImplementedError
+
+
+@compiled
+def _round(seen: Any, size: int) -> None:
+    for index in range(size):
+        seen[index] = np.float64(np.float32(seen[index]))
+
+
+def _observe_mujoco(physics: AnyPhysics, rules: Rules, state: State) -> Any:
+    seen = floats(physics.seen)
+    read(physics, rules, state, seen)
+    _round(seen, 2 * physics.n_joints)
     return seen
 
 
@@ -306,7 +252,15 @@ def _observe_gym(physics: AnyPhysics, rules: Rules, state: State) -> State:
     return x, x_dot, theta, theta_dot
 
 
-@_for_each(_observe_mujoco, _observe_gym)
+def _observe_disturbed(physics: AnyPhysics, rules: Rules, state: State) -> Any:
+    seen, effects = floats(physics.seen), physics.effects
+    read(physics.inner, rules, state, seen)
+    _sense(effects, floats(physics.memory), seen, physics.rng)
+    _round(seen, effects.size + effects.actions)
+    return seen
+
+
+@for_each(_observe_mujoco, _observe_gym, Disturbed=_observe_disturbed)
 def observe(physics: AnyPhysics, rules: Rules, state: State) -> Any:
     """Return the float32 observation, as plain floats again."""
     raise NotImplementedError
@@ -339,7 +293,7 @@ def has_diverged(state: State) -> bool:
 
 
 def _lean_mujoco(physics: AnyPhysics, state: State) -> float:
-    joints, qpos = _ints(physics.joints), _floats(physics.qpos)
+    joints, qpos = ints(physics.joints), floats(physics.qpos)
     angle: float = qpos[joints[1]]
     for index in range(2, physics.n_joints):
         if abs(qpos[joints[index]]) > abs(angle):
@@ -351,7 +305,11 @@ def _lean_gym(physics: AnyPhysics, state: State) -> float:
     return state[2]
 
 
-@_for_each(_lean_mujoco, _lean_gym)
+def _lean_disturbed(physics: AnyPhysics, state: State) -> float:
+    return lean(physics.inner, state)
+
+
+@for_each(_lean_mujoco, _lean_gym, Disturbed=_lean_disturbed)
 def lean(physics: AnyPhysics, state: State) -> float:
     """Return the angle of the pole that leans most, with its sign; see `most_leaning`."""
     raise NotImplementedError
@@ -359,7 +317,7 @@ def lean(physics: AnyPhysics, state: State) -> float:
 
 def _note_mujoco(physics: AnyPhysics, state: State, steps: int, failure: Floats) -> None:
     failure[0] = steps
-    joints, qpos, qvel = _ints(physics.joints), _floats(physics.qpos), _floats(physics.qvel)
+    joints, qpos, qvel = ints(physics.joints), floats(physics.qpos), floats(physics.qvel)
     for index in range(physics.n_joints):
         failure[1 + 2 * index] = qpos[joints[index]]
         failure[2 + 2 * index] = qvel[joints[index]]
@@ -371,7 +329,11 @@ def _note_gym(physics: AnyPhysics, state: State, steps: int, failure: Floats) ->
         failure[1 + index] = value
 
 
-@_for_each(_note_mujoco, _note_gym)
+def _note_disturbed(physics: AnyPhysics, state: State, steps: int, failure: Floats) -> None:
+    note(physics.inner, state, steps, failure)
+
+
+@for_each(_note_mujoco, _note_gym, Disturbed=_note_disturbed)
 def note(physics: AnyPhysics, state: State, steps: int, failure: Floats) -> None:
     """Keep the state of a cart-pole that diverged, and after how many steps it did."""
     raise NotImplementedError

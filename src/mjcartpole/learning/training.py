@@ -225,7 +225,7 @@ class Training:
         fitted = self.learner.imagine(world, cartpole.control_step if cartpole else CONTROL_STEP)
         world.close()
         if self.engine == "compiled":
-            self._loop = type(self._loop)(*self._physics, fitted)
+            self._loop = type(self._loop)(*self._physics, fitted=fitted)
         else:
             self._env = Dream(fitted, rules)
         self._seconds += time.perf_counter() - started

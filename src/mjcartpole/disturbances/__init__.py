@@ -1,0 +1,1 @@
+"""What reality adds to a task."""

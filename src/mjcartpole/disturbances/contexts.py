@@ -1,0 +1,100 @@
+"""Contexts: what an episode draws of the numbers that vary, and the generator that draws it."""
+
+import functools
+import math
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from mjcartpole.disturbances.ranges import Range
+from mjcartpole.errors import ConfigError
+
+Context = dict[str, float]
+"""Numbers of a model, by the names that `--set` knows."""
+
+POOL_SEED: Final = 0
+"""Of the models that all trainings share."""
+
+
+class Contexts(NamedTuple):
+    """What episodes draw.
+
+    Attributes:
+        ranges: What varies.
+        pool: How many contexts there are; 0 for a new one each time.
+        widen: Over how many episodes the ranges widen.
+    """
+
+    ranges: tuple[Range, ...]
+    pool: int
+    widen: int
+
+    def draw(self, rng: np.random.Generator, number: int) -> Context:
+        """Return the context of an episode.
+
+        Args:
+            rng: Draws it.
+            number: The episode, counted from 0.
+        """
+        share = min(1.0, (number + 1) / self.widen) if self.widen else 1.0
+        if self.pool:
+            among = math.ceil(share * self.pool)
+            return self.models()[int(rng.random() * among)]
+        return {each.name: each.at(each.narrowed(rng.random(), share)) for each in self.ranges}
+
+    def models(self) -> list[Context]:
+        """Return the pool, what is nearest to the middle of the ranges first."""
+        return _pool(self.ranges, self.pool)
+
+
+@functools.lru_cache(maxsize=16)
+def _pool(ranges: tuple[Range, ...], size: int) -> list[Context]:
+    drawn = np.random.default_rng(POOL_SEED).random((size, len(ranges))).tolist()
+    drawn.sort(key=lambda shares: max(map(_off_middle, ranges, shares)))
+    return [
+        {each.name: each.at(share) for each, share in zip(ranges, shares, strict=True)}
+        for shares in drawn
+    ]
+
+
+def _off_middle(each: Range, share: float) -> float:
+    return share if each.kind == "choice" else abs(2.0 * share - 1.0)
+
+
+class Chance(NamedTuple):
+    """What draws the disturbances of one environment.
+
+    Attributes:
+        rng: Draws noise, shoves and losses, step after step.
+        key: Seeds what draws the context of each episode, apart from what happened before.
+    """
+
+    rng: np.random.Generator
+    key: tuple[int, ...]
+
+    @classmethod
+    def of(cls, np_random: np.random.Generator, index: int = 0) -> "Chance":
+        """Return that of an environment whose episodes a generator starts.
+
+        It is far ahead in the same stream, which stays where it is: episodes start as without
+        disturbances.
+
+        Args:
+            np_random: The environment's own generator.
+            index: Which of several environments that share it.
+
+        Raises:
+            ConfigError: Its kind cannot be jumped ahead.
+        """
+        bits = np_random.bit_generator
+        if not hasattr(bits, "jumped"):
+            raise ConfigError(
+                f"disturbances need a generator that can be jumped ahead, which "
+                f"{type(bits).__name__} cannot; take numpy's PCG64"
+            )
+        rng = np.random.Generator(bits.jumped(index + 1))
+        return cls(rng, tuple(rng.integers(2**32, size=4).tolist()))
+
+    def context(self, contexts: Contexts, number: int) -> Context:
+        """Return what an episode draws, counted from 0."""
+        return contexts.draw(np.random.default_rng([*self.key, number]), number)

@@ -1,0 +1,265 @@
+"""Disturbances: what reality adds to a task, as numbers and pure functions.
+
+In a control step they act in this order. The chosen push, -1 to 1, is delayed; the motor may hold
+the one before, or drop it; it follows with a lag; noise and shoves add a force on the cart. Then
+the physics move. What is seen of the state is delayed, biased, noisy, and in steps. Rules and
+rewards look at the state itself.
+"""
+
+import dataclasses
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any, Final, Self
+
+import numpy as np
+
+from mjcartpole.disturbances.effects import QUEUE, Effects
+from mjcartpole.disturbances.ranges import Range, parse_ranges
+from mjcartpole.disturbances.shoves import LARGEST, Shove, parse_shove
+from mjcartpole.errors import ConfigError
+from mjcartpole.task import MOST_STEPS, Task, state_names
+
+MOST_SHARE: Final = 1.0
+"""Chances are shares of all control steps."""
+
+MOST_ACTIONS: Final = 8
+"""That can be seen: a table has two bins for each."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Disturbances:
+    """What is added to a task; the defaults add nothing.
+
+    >>> Disturbances(vary={"pole.length": (0.5, 1.5)}, delay=2, noise=0.01)
+    Disturbances(vary=('pole.length=0.5:1.5',), delay=2, noise=(0.01,))
+
+    Each field takes the same everywhere: here, in `gymnasium.make`, in a `TrainConfig`, and as a
+    flag of the command line.
+    """
+
+    vary: tuple[str, ...] = ()
+    """Numbers of the model that each episode draws anew, by the names that --set knows:
+    pole.length=0.5:1.5 uniformly, cart.mass=0.1:10:log by its logarithm, force=8,10,12 one of."""
+    pool: int | None = None
+    """Draw so many models once, the same for every seed, and give each episode one of them; 0 draws
+    anew for each, which takes some milliseconds. Left out: 100 in a training, 0 elsewhere."""
+    widen: int = 0
+    """Over so many episodes, let the ranges widen from their middle to their whole."""
+    delay: int = 0
+    """Control steps from an action to its push; none pushes before."""
+    hold: float = 0.0
+    """Chance of a step in which the motor repeats the push before."""
+    drop: float = 0.0
+    """Chance of a step without a push."""
+    lag: float = 0.0
+    """Seconds in which the motor's push gets within 1/e of what is asked for."""
+    force_noise: float = 0.0
+    """Standard deviation of a force on the cart, N, drawn for each control step."""
+    push: tuple[str, ...] = ()
+    """Shoves of the cart, N s towards +x: 5@2s after two seconds, 0.5@~4s to either side at random,
+    once in four seconds on average."""
+    sensor_delay: int = 0
+    """Control steps by which what is seen is old."""
+    noise: tuple[float, ...] = ()
+    """Standard deviations of what is seen: one for all, or for x, x_dot, theta, theta_dot."""
+    bias: tuple[float, ...] = ()
+    """What is added to all that is seen; one number, or four."""
+    quantize: tuple[float, ...] = ()
+    """What is seen is a multiple of this; one number, or four, 0 for none."""
+    observe_actions: int = 0
+    """How many of the last actions are seen besides, as -1 and 1, the latest first."""
+    observe_context: bool = False
+    """Whether what was drawn of --vary is seen besides; for learners other than tables."""
+
+    def __post_init__(self) -> None:
+        """Refuse what makes no sense, and put values in their usual form.
+
+        Raises:
+            ConfigError: See above.
+        """
+        self._put("vary", tuple(each.text for each in parse_ranges(self.vary)))
+        self._put("push", tuple(each.text for each in _parse_shoves(self.push)))
+        for name in ("noise", "bias", "quantize"):
+            self._put(name, _values(name, getattr(self, name)))
+        for name, most in _COUNTS.items():
+            if getattr(self, name) is not None:
+                _check_count(name, getattr(self, name), most)
+        for name, (unit, limit) in _SIZES.items():
+            self._put(name, _size(name, getattr(self, name), unit, limit))
+        self._put("observe_context", _truth("observe_context", self.observe_context))
+        for name in ("pool", "widen", "observe_context"):
+            if getattr(self, name) not in (None, 0, False) and not self.vary:
+                raise ConfigError(f"{name} is of what vary draws, and nothing varies; give vary")
+
+    def _put(self, name: str, value: object) -> None:
+        object.__setattr__(self, name, value)
+
+    def __repr__(self) -> str:
+        """What differs from the defaults; it evaluates to an equal value."""
+        given = {
+            field.name: getattr(self, field.name)
+            for field in dataclasses.fields(Disturbances)
+            if getattr(self, field.name) != field.default
+        }
+        return f"Disturbances({', '.join(f'{name}={value!r}' for name, value in given.items())})"
+
+    @classmethod
+    def of(cls, other: Any) -> Self:  # noqa: ANN401 - whatever has these fields
+        """Return the disturbances among the fields of something larger."""
+        return cls(**{field.name: getattr(other, field.name) for field in dataclasses.fields(cls)})
+
+    @property
+    def ranges(self) -> tuple[Range, ...]:
+        """What varies, read."""
+        return parse_ranges(self.vary)
+
+    @property
+    def are_some(self) -> bool:
+        """Whether anything is added at all."""
+        return self != NONE
+
+    @property
+    def blur_sensors(self) -> bool:
+        """Whether what is seen may lie outside the task's own bounds."""
+        return any(map(any, (self.noise, self.bias, self.quantize)))
+
+    @property
+    def one_sided(self) -> str:
+        """What of it tells left from right; nothing where left and right stay alike."""
+        if any(self.bias):
+            return "bias"
+        return "push" if any(each.at is not None for each in _parse_shoves(self.push)) else ""
+
+    def check_fits(self, task: Task) -> None:
+        """Refuse what no episode of a task is long enough for.
+
+        Raises:
+            ConfigError: See above.
+        """
+        for name in ("delay", "sensor_delay"):
+            if getattr(self, name) >= task.time_limit:
+                raise ConfigError(
+                    f"{name} of {getattr(self, name)} control steps is no shorter than an episode "
+                    f"of {task.name}, which has {task.time_limit}"
+                )
+
+    def effects(self, poles: int, control_step: float, task: Task) -> tuple["Effects", list[float]]:
+        """Return the same as `actuate` and `sense` take it, and the memory of an episode.
+
+        Args:
+            poles: How many the model has.
+            control_step: Seconds.
+            task: The rules.
+
+        Raises:
+            ConfigError: An episode is too short for a delay or a shove.
+        """
+        self.check_fits(task)
+        size, pushes = len(state_names(poles)), _parse_shoves(self.push)
+        table = [value for each in pushes for value in each.row(control_step, task)]
+        memory = [*[0.0] * QUEUE, *[0.0] * self.delay, *[0.0] * self.observe_actions]
+        memory += [0.0] * (self.sensor_delay * size)
+        constants = len(memory)
+        for values in (self.noise, self.bias, self.quantize):
+            memory += _for_each(values, poles)
+        return Effects(
+            size=size,
+            delay=self.delay,
+            hold=self.hold,
+            drop=self.drop,
+            follow=1.0 - math.exp(-control_step / self.lag) if self.lag else 1.0,
+            force_noise=self.force_noise,
+            pushes=len(pushes),
+            sensor_delay=self.sensor_delay,
+            actions=self.observe_actions,
+            turns=task.turns,
+            constants=constants,
+        ), memory + table
+
+
+_COUNTS: Final = {
+    "pool": 100_000,
+    "widen": MOST_STEPS,
+    "delay": MOST_STEPS,
+    "sensor_delay": MOST_STEPS,
+    "observe_actions": MOST_ACTIONS,
+}
+_SIZES: Final = {
+    "hold": ("of all control steps", MOST_SHARE),
+    "drop": ("of all control steps", MOST_SHARE),
+    "lag": ("s", LARGEST),
+    "force_noise": ("N", LARGEST),
+}
+
+
+def _parse_shoves(pushes: object) -> tuple[Shove, ...]:
+    return tuple(parse_shove(each) for each in _several(pushes))
+
+
+def _several(values: object) -> tuple[Any, ...]:
+    """Return values of which a single one may stand for itself."""
+    if isinstance(values, str | int | float) or not isinstance(values, Iterable):
+        return (values,)
+    return tuple(values)
+
+
+def _check_count(name: str, value: object, most: int) -> None:
+    if type(value) is not int or not 0 <= value <= most:
+        raise ConfigError(f"{name} must be a whole number from 0 to {most:,}, not {value!r}")
+
+
+def _size(name: str, value: Any, unit: str, most: float) -> float:  # noqa: ANN401 - to be checked
+    number = _number(name, value)
+    if not 0 <= number <= most:
+        raise ConfigError(f"{name} must be from 0 to {most:,g} ({unit}), not {value!r}")
+    return number
+
+
+def _number(name: str, value: Any) -> float:  # noqa: ANN401 - to be checked
+    try:
+        if isinstance(value, bool | str):
+            raise TypeError
+        number = float(value)
+    except (TypeError, ValueError, OverflowError):
+        number = math.nan
+    if not abs(number) <= LARGEST:
+        raise ConfigError(f"{name} must be a number up to {LARGEST:,g}, not {value!r}")
+    return number + 0.0
+
+
+def _truth(name: str, value: object) -> bool:
+    if not isinstance(value, bool | np.bool_):
+        raise ConfigError(f"{name} is True or False, not {value!r}")
+    return bool(value)
+
+
+def _values(name: str, values: object) -> tuple[float, ...]:
+    """Return no number, one, or one for each value of a state."""
+    if isinstance(values, Mapping | str):
+        raise ConfigError(f"{name} is one number, or four, not {values!r}")
+    numbers = tuple(_number(name, value) for value in _several(values))
+    if len(numbers) not in (0, 1) and (len(numbers) < 4 or len(numbers) % 2):
+        raise ConfigError(
+            f"{name} is one number, or one each for {', '.join(state_names())}, not {values!r}"
+        )
+    if name != "bias" and min(numbers, default=0.0) < 0:
+        raise ConfigError(f"{name} must be 0 or more, not {values!r}")
+    return numbers if any(numbers) else ()
+
+
+def _for_each(values: tuple[float, ...], poles: int) -> list[float]:
+    """Return one number for each value of a state."""
+    wanted = len(state_names(poles))
+    if len(values) in (0, 1):
+        return list(values or (0.0,)) * wanted
+    each = list(values[:2]) + list(values[2:]) * poles if len(values) == 4 else list(values)
+    if len(each) != wanted:
+        raise ConfigError(
+            f"{len(values)} numbers for what is seen, and a model whose states have {wanted}; "
+            f"give one, or one each for {', '.join(state_names(poles))}"
+        )
+    return each
+
+
+NONE: Final = Disturbances()

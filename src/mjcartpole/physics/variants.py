@@ -1,0 +1,48 @@
+"""Variants of a model: what episodes of varied physics move, each from a document of its own."""
+
+from typing import Final
+
+from mjcartpole.disturbances.contexts import Context, Contexts
+from mjcartpole.disturbances.disturbances import Disturbances
+from mjcartpole.errors import ConfigError, ModelError
+from mjcartpole.physics.cartpole import CartPole
+from mjcartpole.physics.load import load_shared
+
+MOST: Final = 1_000
+"""How many are kept."""
+
+_kept: dict[tuple[str, str, bool, int, tuple[tuple[str, float], ...]], CartPole] = {}
+
+
+def variant(base: CartPole, context: Context) -> CartPole:
+    """Return a model with other numbers, as its edited document has it; shared by all.
+
+    Raises:
+        ConfigError: A number makes no sense.
+        ModelError: It makes the model one that cannot be used.
+    """
+    key = (base.xml, base.name, base.has_own_timestep, base.substeps, tuple(context.items()))
+    found = _kept.get(key)
+    if found is None:
+        own_timestep = base.has_own_timestep or "timestep" in context
+        found = load_shared(base, context, own_timestep=own_timestep)
+        for oldest in list(_kept)[: len(_kept) - MOST + 1]:
+            _kept.pop(oldest, None)
+        _kept[key] = found
+    return found
+
+
+def contexts_of(base: CartPole, disturbances: Disturbances) -> Contexts:
+    """Return what episodes draw, after a look at the ends of each range.
+
+    Raises:
+        ConfigError: An end makes no sense; names the range.
+    """
+    ranges = disturbances.ranges
+    for each in ranges:
+        for end in {each.bounds[0], each.bounds[-1]} if each.kind != "choice" else each.bounds:
+            try:
+                variant(base, {each.name: end})
+            except (ConfigError, ModelError) as error:
+                raise ConfigError(f"vary {each.text!r} cannot be: {error}") from error
+    return Contexts(ranges, disturbances.pool or 0, disturbances.widen)
