@@ -97,12 +97,13 @@ class Disturbances:
 
     def __repr__(self) -> str:
         """What differs from the defaults; it evaluates to an equal value."""
-        given = {
-            field.name: getattr(self, field.name)
-            for field in dataclasses.fields(Disturbances)
-            if getattr(self, field.name) != field.default
-        }
-        return f"Disturbances({', '.join(f'{name}={value!r}' for name, value in given.items())})"
+        return f"Disturbances({', '.join(f'{name}={v!r}' for name, v in self.given.items())})"
+
+    @property
+    def given(self) -> dict[str, Any]:
+        """The fields that are not as by default, by name."""
+        values = {f.name: (getattr(self, f.name), f.default) for f in dataclasses.fields(self)}
+        return {name: value for name, (value, usual) in values.items() if value != usual}
 
     @classmethod
     def of(cls, other: Any) -> Self:  # noqa: ANN401 - whatever has these fields
@@ -118,6 +119,10 @@ class Disturbances:
     def are_some(self) -> bool:
         """Whether anything is added at all."""
         return self != NONE
+
+    def seen_by(self, actions: int) -> Self:
+        """Return the same where so many actions before are seen."""
+        return dataclasses.replace(self, observe_actions=actions)
 
     @property
     def blur_sensors(self) -> bool:

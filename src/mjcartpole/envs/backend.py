@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any, Literal, Unpack, get_args
 
 import gymnasium
 
+from mjcartpole.disturbances.disturbances import NONE, Disturbances
 from mjcartpole.envs.gym_task import GymTask
 from mjcartpole.envs.registration import ENV_ID, env_id
 from mjcartpole.errors import ConfigError, check_known
@@ -49,6 +50,7 @@ def make_env(
     model: "ModelLike" = "cartpole",
     integrator: Integrator = "gym",
     task: Task | str = CARTPOLE_V1,
+    disturbances: Disturbances = NONE,
     *,
     max_episode_steps: int | None = None,
     **changes: Unpack[Changes],
@@ -62,11 +64,12 @@ def make_env(
         ConfigError: The backend or the task is unknown, or the backend would ignore a setting.
         ModelError: The model cannot be used.
     """
-    check_backend(backend, model, integrator)
+    check_backend(backend, model, integrator, disturbances.vary)
     rules = resolve(task, max_episode_steps=max_episode_steps, **changes)
     if backend == "gym":
         env = gymnasium.make(GYM_ID, max_episode_steps=rules.time_limit, disable_env_checker=True)
-        return env if rules is CARTPOLE_V1 else GymTask(env, rules)
+        is_plain = rules is CARTPOLE_V1 and not disturbances.are_some
+        return env if is_plain else GymTask(env, rules, disturbances)
     return gymnasium.make(
         env_id(CONTINUOUS) if rules.continuous else ENV_ID,
         max_episode_steps=rules.time_limit,
@@ -74,4 +77,5 @@ def make_env(
         model=model,
         integrator=integrator,
         task=rules,
+        **disturbances.given,
     )

@@ -72,6 +72,7 @@ _ABOUT: Final[Fields] = {
     "model": str,
     "env_rng": _GENERATOR,
     "learner_rng": _GENERATOR,
+    "chance_rng?": _GENERATOR,
     "seconds": float,
 }
 
@@ -176,6 +177,8 @@ def _pack(checkpoint: Checkpoint) -> bytes:
         "learner_rng": snapshot.learner_rng,
         "seconds": snapshot.seconds,
     }
+    if snapshot.chance_rng is not None:
+        about["chance_rng"] = snapshot.chance_rng
     archive = io.BytesIO()
     arrays: dict[str, Any] = {
         "about": np.frombuffer(json.dumps(about).encode(), np.uint8),
@@ -210,7 +213,11 @@ def _snapshot(
     seconds, curve = float(about["seconds"]), _evaluations(archive, config)
     visits = _added(archive, "state_visits", np.int64, learner.visits.size)
     states = about["env_rng"], about["learner_rng"]
-    snapshot = Snapshot(found, *states, columns, seconds, curve, visits)
+    snapshot = Snapshot(
+        found, *states, columns, seconds, curve, visits, about.get("chance_rng")
+    )
+    if snapshot.chance_rng is None and config.disturbances.are_some:
+        raise ValueError("no generator for the disturbances of the config")
     _check_snapshot(snapshot, config.evaluation_period)
     if visits is not None:
         check_visits(visits, learner.visits.size, int(columns.steps.sum()))
@@ -291,6 +298,6 @@ def _check_snapshot(snapshot: Snapshot, period: int | None) -> None:
         raise ValueError("evaluations at other episodes than the training has them")
     if not np.isfinite(snapshot.evaluations).all():
         raise ValueError("evaluations with values that are not finite")
-    states: tuple[Any, Any] = (snapshot.env_rng, snapshot.learner_rng)
-    for state in states:
+    states = [snapshot.env_rng, snapshot.learner_rng]
+    for state in states + [snapshot.chance_rng] * (snapshot.chance_rng is not None):
         np.random.PCG64().state = state

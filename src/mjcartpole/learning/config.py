@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, Literal, Self
 
+from mjcartpole.disturbances.disturbances import Disturbances
 from mjcartpole.envs.backend import Backend, check_backend
 from mjcartpole.errors import ConfigError, check_known
 from mjcartpole.integrator import Integrator
@@ -21,7 +22,7 @@ from mjcartpole.learning.presets import PRESETS
 from mjcartpole.rewards import REWARDS, named
 from mjcartpole.rule_changes import RuleChanges
 from mjcartpole.rules import RULES
-from mjcartpole.task import CARTPOLE_V1, Task, in_words, state_names
+from mjcartpole.task import CARTPOLE_V1, N_ACTIONS, Task, in_words, state_names
 
 if TYPE_CHECKING:
     from mjcartpole.physics.cartpole import CartPole
@@ -36,6 +37,9 @@ _MOST: Final = {"episodes": MAX_EPISODES, "log_every": MAX_EPISODES, "seed": MAX
 
 _GRID: Final = ("bins", "low", "high")
 _DIMENSIONS: Final = len(state_names())
+
+POOL: Final = 100
+"""Models of a training in which they vary."""
 
 DEFAULT_METHOD: Final = "q-learning"
 """The method of every preset that names no other."""
@@ -117,10 +121,14 @@ class TrainConfig(RuleChanges):
     def __post_init__(self) -> None:
         for name in (*_GRID, "set"):
             object.__setattr__(self, name, tuple(getattr(self, name)))
+        assert isinstance(self, Disturbances)
+        Disturbances.__post_init__(self)
+        edits = *self.set, *self.vary
         check_backend(
-            self.backend, self.model, self.integrator, self.set, own_timestep=self.own_timestep
+            self.backend, self.model, self.integrator, edits, own_timestep=self.own_timestep
         )
         self._take_rules()
+        self._check_disturbances()
         if self.rules.continuous:
             raise ConfigError(f"a table chooses between two actions; {self.task} takes any push")
         self._check_counts()
@@ -209,8 +217,25 @@ class TrainConfig(RuleChanges):
                     f"give {_DIMENSIONS}{also} ({', '.join(state_names(poles))})"
                 )
         bins, low, high = (_for_each_pole(getattr(self, name), poles) for name in _GRID)
-        tilings = getattr(self, "tilings", 1)
-        return Discretizer(bins, low, high, bool(self.mirror), tilings, self.interpolated)
+        n, tilings = self.observe_actions, getattr(self, "tilings", 1)
+        return Discretizer(
+            # Before the first action neither was chosen; that counts as 1.
+            bins=(*bins, *(N_ACTIONS,) * n),
+            low=(*low, *(-1.0,) * n),
+            high=(*high, *(1.0,) * n),
+            mirror=bool(self.mirror),
+            tilings=tilings,
+            interpolated=self.interpolated,
+            actions=n,
+        )
+
+    @property
+    def disturbances(self) -> Disturbances:
+        """What is added to the task in training; models that vary come from a pool."""
+        own = Disturbances.of(self)
+        if own.vary and own.pool is None:
+            return dataclasses.replace(own, pool=POOL)
+        return own
 
     @property
     def evaluation_period(self) -> int | None:
@@ -250,6 +275,25 @@ class TrainConfig(RuleChanges):
                     f"more for each further pole, not {values}"
                 )
 
+    @property
+    def disturbances_after(self) -> Disturbances:
+        """What is added where the policy is evaluated: new models from the whole ranges."""
+        return dataclasses.replace(Disturbances.of(self), widen=0)
+
+    def _check_disturbances(self) -> None:
+        Disturbances.of(self).check_fits(self.rules)
+        method = method_named(self.method)
+        if self.observe_actions and (hasattr(method, "plan") or hasattr(method, "imagine")):
+            raise ConfigError(
+                f"method {self.method!r} learns from equations of the state, in which no action "
+                "before is seen; take another method, or leave out observe_actions"
+            )
+        if self.observe_context:
+            raise ConfigError(
+                "a table has no bins for what varies; observe_context is for environments of other "
+                "learners"
+            )
+
     def _check_counts(self) -> None:
         counts = {"episodes": 1, "log_every": 1, "seed": 0, "evaluate_every": 1}
         for name, least in counts.items():
@@ -283,11 +327,12 @@ def config_class(method: str) -> type[TrainConfig]:
         "TrainConfig",
         # The command line names what a literal can be.
         [("method", Literal[tuple(METHODS)], dataclasses.field(default=method))],
-        bases=(method_named(method).Parameters, TrainConfig),
+        bases=(Disturbances, method_named(method).Parameters, TrainConfig),
         namespace={
             "__doc__": TrainConfig.__doc__,
             "__module__": __name__,
             "__repr__": TrainConfig.__repr__,
+            "__post_init__": TrainConfig.__post_init__,
         },
         frozen=True,
         kw_only=True,

@@ -13,7 +13,7 @@ import hashlib
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, ClassVar, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -53,6 +53,9 @@ class Controller:
     name: str
     poles: int | None
     effort: Effort = field(repr=False)
+
+    actions: ClassVar[int] = 0
+    """How many actions before it looks at."""
 
     def __call__(self, observation: npt.NDArray[np.float32]) -> int:
         """Return the action on whose side the push is: 0 to the left, 1 to the right."""

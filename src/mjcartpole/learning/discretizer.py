@@ -82,6 +82,7 @@ class Discretizer:
         tilings: How many such grids, each a little offset, are summed (see tiles.py).
         interpolated: Whether bins are nodes, evenly from `low` to `high`, with values in between
             (see tiles.py).
+        actions: How many of the dimensions, the last ones, are actions before.
         grid: The same for `row_of`; of several tilings the fine one that all their edges make, and
             between nodes a fine one with a cell around each.
     """
@@ -92,6 +93,7 @@ class Discretizer:
     mirror: bool = False
     tilings: int = 1
     interpolated: bool = False
+    actions: int = 0
     grid: Grid = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:

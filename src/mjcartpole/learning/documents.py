@@ -1,9 +1,11 @@
 """A run's config and summary, read back as if somebody else had written them."""
 
+import dataclasses
 import math
 from pathlib import Path
 from typing import Any, Final
 
+from mjcartpole.disturbances.disturbances import Disturbances
 from mjcartpole.envs.backend import Backend
 from mjcartpole.learning.config import DEFAULT_METHOD, TrainConfig, config_class
 from mjcartpole.learning.episodes import ENDINGS
@@ -22,6 +24,7 @@ _ADDED: Final = {
     "until": None,
     "tilings": 1,
     **dict.fromkeys(RULES),
+    **{field.name: field.default for field in dataclasses.fields(Disturbances)},
 }
 """Fields that configs of version 0.1 lack, and what they stood for."""
 _SUMMARY_FIELDS: Final[Fields] = {

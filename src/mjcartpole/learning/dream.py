@@ -14,15 +14,14 @@ Observation = npt.NDArray[np.float32]
 
 
 def look(
-    env: gymnasium.Env[Any, Any], steps: int, noise: float, rng: np.random.Generator
+    env: gymnasium.Env[Any, Any], steps: int, rng: np.random.Generator
 ) -> tuple[Seen, int]:
     """Play random actions in the world; returns what was seen, and in how many episodes.
 
     Args:
         env: The world.
         steps: How many steps, in as many episodes as that takes; below 0: the first episode.
-        noise: Standard deviation of what is added to each value that is seen, in its own unit.
-        rng: Draws actions and noise.
+        rng: Draws actions.
 
     Raises:
         SimulationError: The physics diverged.
@@ -31,19 +30,13 @@ def look(
     episodes, over = 0, True
     while len(actions) != steps and not (steps < 0 and episodes and over):
         if over:
-            state, episodes = _seen(env.reset()[0], noise, rng), episodes + 1
+            state, episodes = env.reset()[0].astype(np.float64), episodes + 1
         actions.append(int(rng.random() * N_ACTIONS))
         before.append(state)
         observation, _, terminated, truncated, _ = env.step(actions[-1])
-        state, over = _seen(observation, noise, rng), terminated or truncated
+        state, over = observation.astype(np.float64), terminated or truncated
         after.append(state)
     return Seen(np.array(before), np.array(actions), np.array(after)), episodes
-
-
-def _seen(
-    observation: Observation, noise: float, rng: np.random.Generator
-) -> npt.NDArray[np.float64]:
-    return observation.astype(np.float64) + noise * rng.standard_normal(observation.shape)
 
 
 class Dream(gymnasium.Env[Observation, np.int64]):

@@ -10,6 +10,8 @@ import numpy as np
 import numpy.typing as npt
 from gymnasium.utils import seeding
 
+from mjcartpole.disturbances.contexts import Chance
+from mjcartpole.disturbances.disturbances import NONE, Disturbances
 from mjcartpole.envs.backend import GYM_ID, Backend, check_backend, make_env
 from mjcartpole.errors import ConfigError
 from mjcartpole.integrator import Integrator
@@ -104,6 +106,7 @@ def evaluate(
     model: "ModelLike" = "cartpole",
     integrator: Integrator = "gym",
     task: Task | str = CARTPOLE_V1,
+    disturbances: Disturbances = NONE,
     episodes: int = EPISODES,
     seed: int = SEED,
     engine: Engine = "compiled",
@@ -116,6 +119,7 @@ def evaluate(
         model: See `load_model`; for backend mujoco.
         integrator: See `Simulation`.
         task: The rules, or their name.
+        disturbances: What is added. A table sees as many actions before as it looks at.
         episodes: How many to play, at least 1.
         seed: Seeds the starting states.
         engine: Who runs the loop; the compiled one needs a `Policy`, and any other function is
@@ -127,7 +131,7 @@ def evaluate(
         SimulationError: The physics diverged; names episode and step.
     """
     check_count(episodes, seed)
-    check_backend(backend, model, integrator)
+    check_backend(backend, model, integrator, disturbances.vary)
     rules = resolve(task)
     if backend == "mujoco":
         from mjcartpole.physics.load import load_model  # noqa: PLC0415 - it imports MuJoCo
@@ -138,14 +142,17 @@ def evaluate(
         engine, poles, name = choose_engine(engine, backend, task=rules), 1, GYM_ID
     if isinstance(policy, Policy | Controller):
         policy.check_fits(poles, name)
+        disturbances = disturbances.seen_by(policy.actions)
     play = player(policy, rules)
     if engine == "compiled" and isinstance(policy, Policy):
         from mjcartpole.learning.compiled import CompiledLoop  # noqa: PLC0415 - it is heavy
 
         rng, _ = seeding.np_random(seed)
-        log = CompiledLoop(backend, model, integrator, rules).play(policy, rng, episodes)
+        chance = Chance.of(rng) if disturbances.are_some else None
+        loop = CompiledLoop(backend, model, integrator, rules, disturbances)
+        log = loop.play(policy, rng, episodes, chance)
         return Evaluation(backend, seed, tuple(log))
-    env = make_env(backend, model, integrator, rules)
+    env = make_env(backend, model, integrator, rules, disturbances)
     played = tuple(
         play_episode(env, play, number=number, seed=seed if number == 0 else None)[0]
         for number in range(episodes)
@@ -183,6 +190,7 @@ def evaluate_where_trained(
         model=cartpole if cartpole is not None and config.backend == "mujoco" else "cartpole",
         integrator=config.integrator,
         task=config.rules,
+        disturbances=config.disturbances_after,
         seed=seed,
         engine=engine,
     )

@@ -43,8 +43,9 @@ _MORE_FIELDS: Final[dict[int, dict[str, type]]] = {
     VERSION: {},
     2: {"tilings": int, "mirror": bool},
     3: {"interpolated": bool, "mirror": bool},
+    4: {"tilings": int, "interpolated": bool, "mirror": bool, "actions": int},
 }
-"""What a file of each version has besides: of several tilings, and of nodes."""
+"""What a file of each version has besides: of several tilings, of nodes, with actions seen."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -126,19 +127,30 @@ class Policy:
     @property
     def poles(self) -> int:
         """How many poles the observation has that the table is for."""
-        return len(self.discretizer.bins) // 2 - 1
+        return (len(self.discretizer.bins) - self.actions) // 2 - 1
 
-    def check_fits(self, poles: int, where: str) -> None:
+    @property
+    def actions(self) -> int:
+        """How many actions before the table looks at."""
+        return self.discretizer.actions
+
+    def check_fits(self, poles: int, where: str, actions: int | None = None) -> None:
         """Refuse to play where the observation is another one than that of the table.
 
         Args:
             poles: How many there are.
             where: What a person calls the place.
+            actions: How many actions before are seen there; None for as many as it looks at.
 
         Raises:
             ConfigError: See above.
         """
-        n = len(self.discretizer.bins)
+        n = len(self.discretizer.bins) - self.actions
+        if actions is not None and actions != self.actions:
+            raise ConfigError(
+                f"the policy looks at {self.actions} actions before, and {where} shows {actions}; "
+                f"play it with observe_actions={self.actions}"
+            )
         if n != len(state_names(poles)):
             whole = n % 2 == 0 and self.poles > 0
             what = in_words(self.poles) if whole else f"observations of {n} values"
@@ -178,6 +190,7 @@ class Policy:
 def _to_text(policy: Policy) -> str:
     grid = policy.discretizer
     version = 3 if grid.interpolated else VERSION if grid.tilings == 1 else 2
+    version = 4 if grid.actions else version
     content: dict[str, Any] = {
         "bins": list(grid.bins),
         "low": list(grid.low),

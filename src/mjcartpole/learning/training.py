@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 from gymnasium.utils import seeding
 
+from mjcartpole.disturbances.contexts import Chance
 from mjcartpole.envs.backend import make_env
 from mjcartpole.errors import ConfigError, SimulationError
 from mjcartpole.learning.config import TrainConfig
@@ -25,7 +26,9 @@ from mjcartpole.learning.learner import Learner
 from mjcartpole.learning.loop import learn_episodes
 from mjcartpole.learning.policy import Policy
 from mjcartpole.physics.cartpole import CartPole
+from mjcartpole.physics.edit.semantic_edits import meaning_of
 from mjcartpole.physics.symmetry import check_symmetric
+from mjcartpole.physics.variants import variant
 from mjcartpole.task import CONTROL_STEP, N_ACTIONS
 
 
@@ -107,6 +110,7 @@ class Snapshot:
         seconds: Time they took.
         evaluations: The greedy evaluations so far.
         visits: See `TrainResult`; flat.
+        chance_rng: State of the generator that draws disturbances, where there are some.
     """
 
     memory: dict[str, npt.NDArray[Any]] = field(repr=False)
@@ -116,6 +120,7 @@ class Snapshot:
     seconds: float
     evaluations: tuple[GreedyPoint, ...] = field(default=(), repr=False)
     visits: npt.NDArray[np.int64] | None = field(default=None, repr=False)
+    chance_rng: dict[str, Any] | None = field(default=None, repr=False)
 
 
 class Training:
@@ -174,13 +179,20 @@ class Training:
         self._all_counted = True
         self._cartpole = cartpole
         self._env_rng, _ = seeding.np_random(config.seed)
+        self._chance = Chance.of(self._env_rng) if config.disturbances.are_some else None
         self._seconds = 0.0
         self.engine: Engine = "python"
         if env is not None:
             self._env = env
             return
         model = cartpole or config.model
-        self._physics = (config.backend, model, config.integrator, config.rules)
+        self._physics = (
+            config.backend,
+            model,
+            config.integrator,
+            config.rules,
+            config.disturbances,
+        )
         self.engine = choose_engine(engine, config.backend, cartpole, config.rules)
         if self.engine == "compiled":
             from mjcartpole.learning.compiled import CompiledLoop  # noqa: PLC0415 - it is heavy
@@ -201,7 +213,9 @@ class Training:
         run = self._run_compiled if self.engine == "compiled" else self._run_python
         self._imagine()
         if self.engine == "compiled":
-            self._loop.compile(self.learner, self.discretizer, self._env_rng, self.log)
+            self._loop.compile(
+                self.learner, self.discretizer, self._env_rng, self.log, self._chance
+            )
         self._plan()
         self._evaluate_if_due()
         started = time.perf_counter() - self._seconds
@@ -220,7 +234,7 @@ class Training:
             return
         started = time.perf_counter()
         world = self._env if self.engine == "python" else make_env(*self._physics)
-        world.unwrapped.np_random = self._env_rng
+        self._lend(world)
         cartpole, rules = self._cartpole, self.config.rules
         fitted = self.learner.imagine(world, cartpole.control_step if cartpole else CONTROL_STEP)
         world.close()
@@ -269,10 +283,18 @@ class Training:
         return True
 
     def _run_compiled(self, numbers: range) -> Iterator[int]:
-        return self._loop.learn(self.learner, self.discretizer, self._env_rng, self.log, numbers)
+        return self._loop.learn(
+            self.learner, self.discretizer, self._env_rng, self.log, numbers, self._chance
+        )
+
+    def _lend(self, env: gymnasium.Env[Any, Any], episode: int = 0) -> None:
+        """Let an environment draw from the training's own generators."""
+        env.unwrapped.np_random = self._env_rng
+        if self._chance and env.has_wrapper_attr("disturber"):
+            env.get_wrapper_attr("disturber").follow(self._env_rng, self._chance, episode)
 
     def _run_python(self, numbers: range) -> Iterator[int]:
-        self._env.unwrapped.np_random = self._env_rng
+        self._lend(self._env, numbers.start)
         for episode in learn_episodes(self._env, self.learner, self.discretizer, numbers):
             self.log.append(episode)
             yield len(self.log)
@@ -303,6 +325,7 @@ class Training:
             seconds=self._seconds,
             evaluations=self.evaluations,
             visits=self._visits(),
+            chance_rng=dict(self._chance.rng.bit_generator.state) if self._chance else None,
         )
 
     def _visits(self) -> npt.NDArray[np.int64] | None:
@@ -314,6 +337,8 @@ class Training:
             getattr(self.learner.memory, name)[:] = array
         self._env_rng.bit_generator.state = snapshot.env_rng
         self.learner.rng.bit_generator.state = snapshot.learner_rng
+        if self._chance and snapshot.chance_rng:
+            self._chance.rng.bit_generator.state = snapshot.chance_rng
         self.log = EpisodeLog.of(snapshot.columns, self.config.episodes)
         self._seconds = snapshot.seconds
         self.evaluations = snapshot.evaluations
@@ -366,12 +391,29 @@ def training_grid(
     if config.mirror is False or (config.mirror is None and env is not None):
         return grid
     try:
-        check_symmetric(cartpole, config.integrator, task=config.rules)
+        _check_alike(config, cartpole)
         return dataclasses.replace(grid, mirror=True)
     except (ConfigError, SimulationError):
         if config.mirror:
             raise
         return grid
+
+
+def _check_alike(config: TrainConfig, cartpole: CartPole | None) -> None:
+    """Refuse to mirror where left and right differ, of a model or of one of its variants."""
+    if config.disturbances.one_sided:
+        raise ConfigError(
+            f"mirror needs left and right to be alike; {config.disturbances.one_sided} tells them "
+            "apart"
+        )
+    check_symmetric(cartpole, config.integrator, task=config.rules)
+    if cartpole is None:
+        return
+    # What is edited by meaning leaves left and right as they are.
+    for each in config.disturbances.ranges:
+        for end in each.bounds if meaning_of(each.name) is None else ():
+            changed = variant(cartpole, {each.name: end})
+            check_symmetric(changed, config.integrator, task=config.rules)
 
 
 def _count_poles(cartpole: CartPole | None, env: gymnasium.Env[Any, Any] | None) -> int:

@@ -13,7 +13,6 @@ import gymnasium
 import numpy as np
 
 from mjcartpole.errors import ConfigError
-from mjcartpole.learning.discretizer import is_finite
 from mjcartpole.learning.dream import look
 from mjcartpole.learning.fitted import Fitted, Linear, Rod, fit_linear, fit_rod
 from mjcartpole.learning.methods import q_learning
@@ -33,8 +32,6 @@ __all__ = ["act", "after_episode", "after_step", "begin_episode", "greedy_values
 Fit = Literal["rod", "linear"]
 """What is fitted: a rod's own equations, or a linear model without physics."""
 
-MOST_NOISE = 100
-
 ROD_STEPS = 3
 """Each gives two equations, for two unknowns and two."""
 
@@ -50,8 +47,6 @@ class Parameters(q_learning.Parameters):
     fit_steps: int | None = None
     """Random steps in the world that it is fitted to, in as many episodes as that takes; left out:
     3 for a rod, one episode for a linear model."""
-    noise: float = 0.0
-    """Standard deviation of what is added to each value seen in them: m, m/s, rad, rad/s."""
 
     def check_parameters(self) -> None:
         """Refuse values that make no sense.
@@ -63,8 +58,6 @@ class Parameters(q_learning.Parameters):
         self._check_one_of("fit", ("rod", "linear"))
         if self.fit_steps is not None:
             self._check_whole("fit_steps", 1, 1_000_000)
-        if not (is_finite(self.noise) and 0 <= self.noise <= MOST_NOISE):
-            raise ConfigError(f"noise must be a number from 0 to {MOST_NOISE}, not {self.noise!r}")
 
     def check_world(self, poles: int, task: Task) -> None:
         """Refuse what the model cannot be one of.
@@ -110,7 +103,7 @@ def imagine(
     model, is_rod = np.asarray(memory.model), p.fit == 0
     if not memory.seen[0]:
         steps = ROD_STEPS if p.fit_steps < 0 and is_rod else p.fit_steps
-        seen, episodes = look(env, steps, p.noise, rng)
+        seen, episodes = look(env, steps, rng)
         model[:] = np.ravel((fit_rod(seen, h) if is_rod else fit_linear(seen))[:-1])
         memory.seen[0], memory.seen[1] = episodes, len(seen.actions)
     if is_rod:
