@@ -68,6 +68,17 @@ def test_several_environments_draw_apart_and_leave_their_generator_alone() -> No
     assert len({float(each.rng.random()) for each in chances}) == 3
 
 
-def test_a_generator_that_cannot_jump_is_refused() -> None:
-    with pytest.raises(ConfigError, match="SFC64 cannot; take numpy's PCG64"):
-        Chance.of(np.random.Generator(np.random.SFC64(0)))
+def test_what_a_generator_has_drawn_makes_no_difference() -> None:
+    rng = np.random.default_rng(3)
+    first = Chance.of(rng).key
+    rng.random(5)
+    assert Chance.of(rng).key == first
+
+
+def test_a_generator_without_a_seed_is_refused() -> None:
+    class Entropy(np.random.bit_generator.ISeedSequence):
+        def generate_state(self, n_words: int, dtype: type = np.uint32) -> np.ndarray:
+            return np.ones(n_words, dtype)
+
+    with pytest.raises(ConfigError, match=r"shows none; take numpy.random.default_rng\(seed\)"):
+        Chance.of(np.random.Generator(np.random.PCG64(Entropy())))

@@ -12,6 +12,9 @@ from mjcartpole.errors import ConfigError
 Context = dict[str, float]
 """Numbers of a model, by the names that `--set` knows."""
 
+STREAM: Final = 2
+"""Spawn key of what draws disturbances."""
+
 POOL_SEED: Final = 0
 """Of the models that all trainings share."""
 
@@ -76,23 +79,23 @@ class Chance(NamedTuple):
     def of(cls, np_random: np.random.Generator, index: int = 0) -> "Chance":
         """Return that of an environment whose episodes a generator starts.
 
-        It is far ahead in the same stream, which stays where it is: episodes start as without
-        disturbances.
+        It has a stream of its own from the same seed: episodes start as without disturbances.
 
         Args:
             np_random: The environment's own generator.
             index: Which of several environments that share it.
 
         Raises:
-            ConfigError: Its kind cannot be jumped ahead.
+            ConfigError: Nobody knows its seed.
         """
-        bits = np_random.bit_generator
-        if not hasattr(bits, "jumped"):
+        seed = getattr(np_random.bit_generator, "seed_seq", None)
+        if not isinstance(seed, np.random.SeedSequence):
             raise ConfigError(
-                f"disturbances need a generator that can be jumped ahead, which "
-                f"{type(bits).__name__} cannot; take numpy's PCG64"
+                "disturbances are drawn from the seed of the environment's generator, and "
+                f"{np_random!r} shows none; take numpy.random.default_rng(seed)"
             )
-        rng = np.random.Generator(bits.jumped(index + 1))
+        own = np.random.SeedSequence(seed.entropy, spawn_key=(*seed.spawn_key, STREAM, index))
+        rng = np.random.default_rng(own)
         return cls(rng, tuple(rng.integers(2**32, size=4).tolist()))
 
     def context(self, contexts: Contexts, number: int) -> Context:

@@ -7,7 +7,9 @@ import numpy as np
 import numpy.typing as npt
 from gymnasium import spaces
 
-from mjcartpole.envs.actions import action_space, push_of
+from mjcartpole.disturbances.disturbances import NONE, Disturbances
+from mjcartpole.envs.actions import action_space, invalid, push_of
+from mjcartpole.envs.disturber import Disturber
 from mjcartpole.task import Task, control_of
 
 Observation = npt.NDArray[np.float32]
@@ -19,17 +21,28 @@ class GymTask(gymnasium.Wrapper[Observation, np.int64, Observation, np.int64]):
     Args:
         env: Gymnasium's environment, with the task's time limit.
         task: The rules.
+        disturbances: What is added.
+
+    Attributes:
+        disturber: Adds them; None where nothing is added.
     """
 
-    def __init__(self, env: gymnasium.Env[Observation, np.int64], task: Task) -> None:
+    def __init__(
+        self,
+        env: gymnasium.Env[Observation, np.int64],
+        task: Task,
+        disturbances: Disturbances = NONE,
+    ) -> None:
         super().__init__(env)
+        self.disturber = Disturber(disturbances, None, task) if disturbances.are_some else None
         self._task, self._cartpole = task, env.unwrapped
         self._force: float = self._cartpole.force_mag  # type: ignore[attr-defined]
         self._cartpole.x_threshold = task.x_limit  # type: ignore[attr-defined]
         self._cartpole.theta_threshold_radians = task.theta_limit  # type: ignore[attr-defined]
         bound = task.observation_bound()
         self.action_space = action_space(task)
-        self.observation_space = spaces.Box(-bound, bound, dtype=np.float32)
+        space: Any = spaces.Box(-bound, bound, dtype=np.float32)
+        self.observation_space = self.disturber.space(space) if self.disturber else space
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -41,7 +54,9 @@ class GymTask(gymnasium.Wrapper[Observation, np.int64, Observation, np.int64]):
             x, x_dot, theta, theta_dot = self._cartpole.state  # type: ignore[attr-defined]
             state = np.array([x, x_dot, theta + self._task.start_angle, theta_dot])
             self._cartpole.state = state  # type: ignore[attr-defined]
-        return self._seen().astype(np.float32), info
+        if self.disturber:
+            self.disturber.begin(self._cartpole.np_random)
+        return self._observed(self._seen()), info
 
     def step(self, action: Any) -> tuple[Observation, float, bool, bool, dict[str, Any]]:  # noqa: ANN401
         """Advance one control step; the reward is the task's.
@@ -49,15 +64,28 @@ class GymTask(gymnasium.Wrapper[Observation, np.int64, Observation, np.int64]):
         Raises:
             InvalidActionError: A push is none.
         """
-        if self._task.continuous:
-            # Action 1 has the push of this step.
-            self._cartpole.force_mag = control_of(push_of(action), (-self._force, self._force))  # type: ignore[attr-defined]
+        if self._task.continuous or self.disturber:
+            # Action 1 has the force of this step.
+            self._cartpole.force_mag = self._force_of(action)  # type: ignore[attr-defined]
             action = 1
         _, _, terminated, truncated, info = self.env.step(action)
         seen = self._seen()
         x, x_dot, theta, theta_dot = seen.tolist()
         reward = self._task.reward(x, x_dot, theta, theta_dot, terminated)
-        return seen.astype(np.float32), reward, terminated, truncated, info
+        return self._observed(seen), reward, terminated, truncated, info
+
+    def _force_of(self, action: Any) -> float:  # noqa: ANN401
+        """The force that an action comes to, N."""
+        known = self._task.continuous or self.action_space.contains(action)
+        if not known:
+            raise invalid(action)
+        push, force = push_of(action) if self._task.continuous else 2.0 * action - 1.0, 0.0
+        if self.disturber:
+            push, force = self.disturber.actuate(float(push))
+        return control_of(push, (-self._force, self._force)) + force
+
+    def _observed(self, seen: npt.NDArray[np.float64]) -> Observation:
+        return self.disturber.sense(seen) if self.disturber else seen.astype(np.float32)
 
     def _seen(self) -> npt.NDArray[np.float64]:
         """The state as the rules have it."""

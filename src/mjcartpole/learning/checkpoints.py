@@ -298,6 +298,6 @@ def _check_snapshot(snapshot: Snapshot, period: int | None) -> None:
         raise ValueError("evaluations at other episodes than the training has them")
     if not np.isfinite(snapshot.evaluations).all():
         raise ValueError("evaluations with values that are not finite")
-    states = [snapshot.env_rng, snapshot.learner_rng]
-    for state in states + [snapshot.chance_rng] * (snapshot.chance_rng is not None):
+    states: list[Any] = [snapshot.env_rng, snapshot.learner_rng, snapshot.chance_rng]
+    for state in filter(None, states):
         np.random.PCG64().state = state
