@@ -23,6 +23,7 @@ LAYERS = [
     "rules",
     "task",
     "rule_changes",
+    "disturbances",
     "integrator",
     "leftovers",
     "files",

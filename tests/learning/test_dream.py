@@ -39,21 +39,14 @@ class Corridor(gymnasium.Env):
     ],
 )
 def test_what_is_seen_is_so_many_steps_in_as_many_episodes_as_that_takes(steps, before, episodes):
-    seen, played = look(Corridor(), steps, 0.0, np.random.default_rng(0))
+    seen, played = look(Corridor(), steps, np.random.default_rng(0))
     assert (seen.before[:, 0].tolist(), played) == (before, episodes)
     assert (seen.after == seen.before + 1).all()
     assert set(seen.actions.tolist()) <= {0, 1}
 
 
-def test_an_observation_is_as_noisy_after_a_step_as_before_the_next():
-    seen, _ = look(Corridor(), 3_000, 0.25, np.random.default_rng(0))
-    within = np.arange(2_999) % 3 != 2
-    np.testing.assert_array_equal(seen.after[:-1][within], seen.before[1:][within])
-    errors = seen.before - np.resize([0.0, 1.0, 2.0], 3_000)[:, None]
-    assert errors.mean() == pytest.approx(0.0, abs=0.01)
-    np.testing.assert_allclose(np.cov(errors.T), 0.25**2 * np.eye(4), atol=0.004)
-    plain, _ = look(Corridor(), 3_000, 0.0, np.random.default_rng(0))
-    assert seen.actions.tolist() == plain.actions.tolist()
+def test_random_actions_are_as_often_one_as_the_other():
+    seen, _ = look(Corridor(), 3_000, np.random.default_rng(0))
     assert seen.actions.mean() == pytest.approx(0.5, abs=0.03)
 
 

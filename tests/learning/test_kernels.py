@@ -24,9 +24,9 @@ from mjcartpole.learning.compiled import _arrays
 from mjcartpole.learning.config import TrainConfig, config_class
 from mjcartpole.learning.discretizer import Discretizer
 from mjcartpole.learning.learner import Learner
+from mjcartpole.learning.linking import compiled
 from mjcartpole.learning.methods import METHODS, action_values, n_step_sarsa, sarsa
 from mjcartpole.learning.methods.experience import Trajectory, Transition
-from mjcartpole.learning.stepping import compiled
 from mjcartpole.rewards import minus_one_at_the_end, one_per_step
 from nightly import examples, few
 

@@ -2,12 +2,7 @@
 
 import math
 import struct
-import subprocess
-import sys
-import sysconfig
-from pathlib import Path
 
-import mujoco
 import numba
 import numpy as np
 import pytest
@@ -15,12 +10,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mjcartpole import task
+from mjcartpole.disturbances.disturbances import NONE
 from mjcartpole.errors import SimulationError
-from mjcartpole.learning import compiled, kernels, stepping
+from mjcartpole.learning import compiled, kernels, kinds, stepping
 from mjcartpole.learning.discretizer import Discretizer
+from mjcartpole.learning.linking import link
+from mjcartpole.learning.worlds import Worlds
 from mjcartpole.physics.library import libmujoco
 from mjcartpole.physics.load import load_model
-from mjcartpole.physics.simulation import LARGEST_SANE, Simulation, check_sane
+from mjcartpole.physics.simulation import LARGEST_SANE, check_sane
 from nightly import examples
 
 quick = examples(200)
@@ -32,10 +30,12 @@ state_values = st.floats() | st.sampled_from(
     ]
 )
 states = st.tuples(*[state_values] * 4)
-GYM = stepping.GymPhysics(-10.0, 10.0, 0.0)
-TWO = Simulation(load_model("twopoles"))
-MEMORY = compiled._Memory.of(TWO, task.CARTPOLE_V1)
-POLES = compiled._physics(TWO, MEMORY, task.CARTPOLE_V1)
+GYM = kinds.GymPhysics(-10.0, 10.0, 0.0)
+WORLD = Worlds(load_model("twopoles"), "gym", task.CARTPOLE_V1, NONE)
+POLES = WORLD.physics(None, 0)
+TWO = WORLD._first.simulation
+assert TWO is not None
+assert link(libmujoco()) == ""
 
 
 def bits(*values):
@@ -60,39 +60,6 @@ RULES = compiled._rules(task.CARTPOLE_V1)
 
 def is_over(state):
     return stepping.is_over(RULES, tuple(state))
-
-
-def test_libmujoco_is_found_and_linked():
-    library = libmujoco()
-    assert library.is_file()
-    assert library.parent == Path(mujoco.__file__).parent
-    assert stepping.link(library) == ""
-    assert stepping.link(library) == "", "a second time as well"
-
-
-def test_no_library_is_a_reason():
-    assert stepping.link(None) == "libmujoco was not found in the mujoco package"
-
-
-def test_what_is_no_library_is_a_reason(tmp_path):
-    (tmp_path / "libmujoco.so.1").write_text("words")
-    for path in (tmp_path / "libmujoco.so.1", tmp_path / "nothing.so"):
-        assert stepping.link(path).startswith("libmujoco cannot be linked: ")
-        assert path.name in stepping.link(path)
-
-
-def test_a_library_without_mj_step_is_a_reason():
-    """In a process where nothing else has brought mj_step along."""
-    extensions = sysconfig.get_config_var("EXT_SUFFIX")
-    library = next(Path(np.__file__).parent.rglob(f"*{extensions}"))
-    script = "import sys, pathlib; from mjcartpole.learning import stepping; print(stepping.link("
-    done = subprocess.run(
-        [sys.executable, "-c", f"{script}pathlib.Path(sys.argv[1])))", str(library)],
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert done.stdout == f"'{library}' has no mj_step\n"
 
 
 @given(st.integers(0, 2**63), st.sampled_from([(-0.05, 0.05), (0.0, 0.0), (-2.0, 1.0)]))

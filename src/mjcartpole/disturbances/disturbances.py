@@ -17,7 +17,7 @@ import numpy as np
 from mjcartpole.disturbances.effects import QUEUE, Effects
 from mjcartpole.disturbances.ranges import Range, parse_ranges
 from mjcartpole.disturbances.shoves import LARGEST, Shove, parse_shove
-from mjcartpole.errors import ConfigError
+from mjcartpole.errors import ConfigError, check_known
 from mjcartpole.task import MOST_STEPS, Task, state_names
 
 MOST_SHARE: Final = 1.0
@@ -119,6 +119,28 @@ class Disturbances:
     def are_some(self) -> bool:
         """Whether anything is added at all."""
         return self != NONE
+
+    @classmethod
+    def taken_from(
+        cls, settings: dict[str, Any], given: "Disturbances | Mapping[str, Any] | None" = None
+    ) -> "Disturbances":
+        """Return disturbances among keyword arguments, which are taken out of there.
+
+        Args:
+            settings: What was given by name, and more.
+            given: All of them in one; a mapping is as good as the value.
+
+        Raises:
+            ConfigError: They make no sense, or one is given twice.
+        """
+        names = [field.name for field in dataclasses.fields(Disturbances)]
+        own = {name: settings.pop(name) for name in names if name in settings}
+        known = dict(given.given if isinstance(given, Disturbances) else given or {})
+        if both := [name for name in own if name in known]:
+            raise ConfigError(f"{both[0]} is given by itself and in disturbances; give one")
+        for name in known:
+            check_known("disturbance", name, names)
+        return Disturbances(**known, **own)
 
     def seen_by(self, actions: int) -> Self:
         """Return the same where so many actions before are seen."""

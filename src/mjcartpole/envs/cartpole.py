@@ -1,22 +1,25 @@
 """CartPole-v1 with MuJoCo underneath, as a `gymnasium.Env`."""
 
-import copy
-from collections.abc import Callable
-from typing import Any, Self, Unpack
+from collections.abc import Callable, Mapping
+from typing import Any, cast
 
 import gymnasium
 import numpy as np
 import numpy.typing as npt
 from gymnasium import logger
 
+from mjcartpole.disturbances.contexts import Context
+from mjcartpole.disturbances.disturbances import Disturbances
 from mjcartpole.envs.actions import STEP_AFTER_END, action_space, invalid
+from mjcartpole.envs.copied import Copied, needs_reset
+from mjcartpole.envs.disturber import Disturber
 from mjcartpole.envs.editable import Editable
 from mjcartpole.envs.names import CartPoleNames, refuse_slip
 from mjcartpole.envs.observations import Observation, observed, observer
 from mjcartpole.envs.options import reset_options, rules_of, usual
 from mjcartpole.envs.pictures import InNotebooks, Pictures, RenderMode, warn_without_mode
 from mjcartpole.envs.spec import PortableSpec
-from mjcartpole.errors import ConfigError, ResetNeededError
+from mjcartpole.errors import ConfigError
 from mjcartpole.integrator import Integrator
 from mjcartpole.media.renderer import DEFAULT_HEIGHT, DEFAULT_WIDTH
 from mjcartpole.media.scene import DEFAULT_CAMERA
@@ -36,16 +39,13 @@ from mjcartpole.task import (
 _INT64 = np.int64
 _FARTHEST = FARTHEST_SANE
 
-_WIRES = ("_move", "_middle", "_advance", "_at_hand")
-"""What a copy makes anew: functions and views that hold on to one simulation."""
-
-
-_OWN = ("_simulation", "_pictures", "_model", "_steps_after_end")
-"""What even a shallow copy has for itself."""
-
 
 class CartPoleEnv(
-    InNotebooks, PortableSpec, gymnasium.Env[npt.NDArray[np.float32], np.int64 | int], CartPoleNames
+    InNotebooks,
+    PortableSpec,
+    Copied,
+    gymnasium.Env[npt.NDArray[np.float32], np.int64 | int],
+    CartPoleNames,
 ):
     """CartPole-v1, moved by MuJoCo.
 
@@ -129,6 +129,7 @@ class CartPoleEnv(
     | `reward`              | str, function          | the task's  | "one-per-step", "minus-one-at-the-end", "upright", or one's own; see `mjcartpole.Task` |
     | `sutton_barto_reward` | bool                   | False       | See Rewards                   |
     | `observation`         | "state" or "trig"      | "state"     | "trig": `x, x_dot`, and of each pole `cos theta, sin theta, theta_dot` |
+    | `disturbances`        | dict, Disturbances     | None        | What reality adds: `vary`, `delay`, `noise`, …, each also by itself; see docs/robustness.md |
     | `render_mode`         | None, "rgb_array", "human" | None    | Nothing, arrays, or a window (where there is a screen) |
     | `width`, `height`     | int                    | 640, 480    | Size of a picture, in pixels  |
     | `camera`              | str                    | "side"      | A camera of the model         |
@@ -169,7 +170,8 @@ class CartPoleEnv(
         width: int = DEFAULT_WIDTH,
         height: int = DEFAULT_HEIGHT,
         camera: str = DEFAULT_CAMERA,
-        **rules: Unpack[Changes],
+        disturbances: Disturbances | Mapping[str, Any] | None = None,
+        **more: Any,  # noqa: ANN401 - rules and disturbances
     ) -> None:
         """Load the model; nothing is drawn and no OpenGL is touched until `render`.
 
@@ -183,7 +185,9 @@ class CartPoleEnv(
         self._model = Editable(cartpole, integrator)
         # Made when it is first needed: it takes several times as long as all the rest.
         self._simulation: Simulation | None = None
-        self._task = rules_of(task, rules, sutton_barto_reward=sutton_barto_reward)
+        added = Disturbances.taken_from(more, disturbances)
+        self._task = rules_of(task, cast(Changes, more), sutton_barto_reward=sutton_barto_reward)
+        self.disturber = Disturber.where_needed(added, cartpole, self._task)
         self._observation = observation
         if self._task.continuous and type(self) is CartPoleEnv:
             raise ConfigError(f"{self._task.name} takes pushes; see ContinuousCartPoleEnv")
@@ -192,7 +196,7 @@ class CartPoleEnv(
         self.action_space = action_space(self._task)
         self.render_mode = render_mode
         self._pictures = Pictures(cartpole, render_mode, width, height, camera, self._task)
-        self._advance: Callable[[float], State] = _needs_reset
+        self._advance: Callable[[float], State] = needs_reset
         self._steps_after_end: list[int | None] = [None]
         self._left, self._right = cartpole.controls
         self._set_frame_rate(cartpole)
@@ -210,9 +214,11 @@ class CartPoleEnv(
         self._simulation, self._model.is_stale = simulation, False
         self._wire(simulation)
 
-    def _begin(self, edits: Edits = None) -> Simulation:
-        """Simulate the model as it is now, with edits that last one episode."""
-        before, simulation = self._simulation, self._model.begin(edits)
+    def _begin(self, edits: Edits = None, context: Context | None = None) -> Simulation:
+        """Simulate the model as it is now, with edits and a context that last one episode."""
+        before, simulation = self._simulation, self._model.begin(edits, context)
+        if self.disturber:
+            self.disturber.fit(simulation.cartpole)
         self._simulation = simulation
         self._wire(simulation)
         self._pictures.close()
@@ -232,30 +238,15 @@ class CartPoleEnv(
         observe: Callable[[], npt.NDArray[np.float32]] = observation.copy
         if poles > 1 or self._observation != "state":
             observe = observer(simulation, self._task, self._observation)
+        if self.disturber:
+            self._move, observe = self.disturber.wires(simulation, self._move, self._observation)
+            self._left, self._right = -1.0, 1.0
         self._at_hand = (*self._limits, cells, observe, CONSTANT.get(self._task.reward))
 
     def _set_limits(self, x: float, theta: float) -> None:
         super()._set_limits(x, theta)
         if self._simulation is not None:
             self._wire(self._simulation)
-
-    def __getstate__(self) -> dict[str, Any]:
-        """All that a copy needs to go on bit-equal; it opens a renderer of its own."""
-        kept = {name: value for name, value in self.__dict__.items() if name not in _WIRES}
-        return kept | {"_advance": self._advance is not _needs_reset}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__dict__.update(state)
-        if self._simulation is not None:
-            self._wire(self._simulation)
-        self._advance = self._move if state["_advance"] else _needs_reset
-
-    def __copy__(self) -> Self:
-        """A copy with a simulation and pictures of its own; all else is shared with it."""
-        own = {name: copy.copy(getattr(self, name)) for name in _OWN}
-        copied = type(self).__new__(type(self))
-        copied.__setstate__(self.__getstate__() | own)
-        return copied
 
     def __setattr__(self, name: str, value: object) -> None:
         own = name[0] == "_" or type(self) is not CartPoleEnv or hasattr(CartPoleEnv, name)
@@ -269,11 +260,13 @@ class CartPoleEnv(
 
         It is `(x, x_dot, theta, theta_dot)`: m, m/s, rad, rad/s; shape (4,) with one pole.
         """
-        return None if self._advance is _needs_reset else self.simulation.state
+        return None if self._advance is needs_reset else self.simulation.state
 
     @state.setter
     def state(self, state: npt.ArrayLike) -> None:
         self.simulation.state = state
+        if self.disturber:
+            self.disturber.forget()
         self._advance = self._move
 
     def step(
@@ -351,10 +344,15 @@ class CartPoleEnv(
         """
         usual = self._usual
         low, high, edits = usual if options is None else reset_options(options, usual)
-        simulation = self._simulation
-        if simulation is None or self._model.is_stale or edits:
+        simulation, disturber = self._simulation, self.disturber
+        varies = disturber is not None and disturber.varies
+        if not varies and (simulation is None or self._model.is_stale or edits):
             simulation = self._begin(edits)
         super().reset(seed=seed)
+        if disturber is not None:
+            context = disturber.draw(self.np_random)
+            simulation = self._begin(edits, context) if varies else simulation
+        assert simulation
         state = self.np_random.uniform(low=low, high=high, size=simulation.size)
         if self._task.start_angle:
             state += self._middle
@@ -365,6 +363,8 @@ class CartPoleEnv(
         self._steps_after_end[0] = None
         if self.render_mode == "human":
             self.render()
+        if disturber is not None:
+            return disturber.first(self._task.seen(state), self._observation)
         return observed(state, self._task, self._observation), {}
 
     def render(self) -> npt.NDArray[np.uint8] | None:
@@ -390,7 +390,3 @@ class CartPoleEnv(
     def close(self) -> None:
         """Free the renderer and the window, if there are any."""
         self._pictures.close()
-
-
-def _needs_reset(control: float) -> State:
-    raise ResetNeededError("Call reset before using step method.")

@@ -40,5 +40,7 @@ class ContinuousCartPoleEnv(CartPoleEnv):
             InvalidActionError: The action is not in the action space.
         """
         # Action 0 has the push of this step.
-        self._left = control_of(push_of(action), self.simulation.cartpole.controls)
+        push = push_of(action)
+        controls = self.simulation.cartpole.controls
+        self._left = push if self.disturber else control_of(push, controls)
         return super().step(0)

@@ -1,7 +1,8 @@
 """Disturbances at work in one environment of plain Python."""
 
+import copy
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -9,12 +10,13 @@ from gymnasium import spaces
 
 from mjcartpole.disturbances.contexts import Chance, Context, Contexts
 from mjcartpole.disturbances.disturbances import Disturbances
-from mjcartpole.disturbances.effects import Effects, actuate, forget, sense
+from mjcartpole.disturbances.effects import QUEUE, Effects, actuate, forget, sense
+from mjcartpole.envs.observations import Observation, Observed, with_cosines
+from mjcartpole.errors import ResetNeededError
 from mjcartpole.physics.cartpole import CartPole
+from mjcartpole.physics.simulation import Simulation, State
 from mjcartpole.physics.variants import contexts_of
 from mjcartpole.task import CONTROL_STEP, Task, control_of
-
-Observation = npt.NDArray[np.float32]
 
 
 class Disturber:
@@ -49,8 +51,19 @@ class Disturber:
         self._chance: Chance | None = None
         self.fit(cartpole)
 
+    @classmethod
+    def where_needed(
+        cls, disturbances: Disturbances, cartpole: CartPole | None, task: Task
+    ) -> Self | None:
+        """Return one; None where nothing is added."""
+        return cls(disturbances, cartpole, task) if disturbances.are_some else None
+
+    def __copy__(self) -> Self:
+        """A copy that goes on by itself, for an environment with the same generator."""
+        return copy.deepcopy(self, {id(self._source): self._source})
+
     def fit(self, cartpole: CartPole | None) -> None:
-        """Let all times be those of a model."""
+        """Let all times be those of a model, before an episode."""
         poles, step = (cartpole.poles, cartpole.control_step) if cartpole else (1, CONTROL_STEP)
         made: tuple[Effects, list[float]] = self.disturbances.effects(poles, step, self._task)
         self.effects, self.memory = made
@@ -69,41 +82,84 @@ class Disturber:
             self._source, self._episode = np_random, episode
             self._chance = chance or Chance.of(np_random, self._index)
 
-    def begin(self, np_random: np.random.Generator) -> Context:
-        """Begin an episode; returns its context."""
+    def draw(self, np_random: np.random.Generator) -> Context:
+        """Return the context of the next episode."""
         self.follow(np_random)
         if self._contexts and self._chance:
             self.context = self._chance.context(self._contexts, self._episode)
         self._episode += 1
-        forget(self.effects, self.memory)
         return self.context
+
+    def forget(self) -> None:
+        """Leave nothing of the motion before."""
+        forget(self.effects, self.memory)
 
     def actuate(self, push: float) -> tuple[float, float]:
         """Return what the motor makes of a push, and a force besides, N."""
-        assert self._chance
-        return actuate(self.effects, self.memory, push, self._chance.rng)
+        return actuate(self.effects, self.memory, push, self._rng)
 
-    def sense(self, state: npt.NDArray[np.float64]) -> Observation:
+    def wires(
+        self, simulation: Simulation, see: Callable[[float], State], kind: Observation
+    ) -> tuple[Callable[[float], State], Callable[[], Observed]]:
+        """Return what moves a simulation by a push, and what observes it.
+
+        Args:
+            simulation: Is moved.
+            see: Moves it by a control.
+            kind: See `observed`.
+        """
+        applied, slider = simulation.data.qfrc_applied, simulation.cartpole.slider
+        controls = simulation.cartpole.controls
+
+        def move(push: float) -> State:
+            made, applied[slider] = self.actuate(push)
+            return see(control_of(made, controls))
+
+        return move, lambda: self.observe(self._task.seen(simulation.state), kind)
+
+    def sense(self, state: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         """Return what is seen of a state as rules have it."""
-        assert self._chance
         seen = [*state.tolist(), *[0.0] * self.effects.actions]
-        sense(self.effects, self.memory, seen, self._chance.rng)
-        return np.array([*seen, *self.seen_context], dtype=np.float32)
+        sense(self.effects, self.memory, seen, self._rng)
+        return np.array(seen[: self.effects.size])
 
     @property
-    def seen_context(self) -> list[float]:
-        """What is seen of the context."""
-        return list(self.context.values()) if self.disturbances.observe_context else []
+    def seen_besides(self) -> list[float]:
+        """What is seen besides the state: the last actions, and the context."""
+        first = QUEUE + self.effects.delay
+        actions = self.memory[first : first + self.effects.actions]
+        return [*actions, *(self.context.values() if self.disturbances.observe_context else ())]
+
+    def observe(self, state: npt.NDArray[np.float64], kind: Observation) -> Observed:
+        """Return the observation of a state as rules have it; see `observed` for the kind."""
+        seen = self.sense(state)
+        seen = with_cosines(seen) if kind == "trig" else seen
+        return np.array([*seen.tolist(), *self.seen_besides], dtype=np.float32)
+
+    def first(
+        self, state: npt.NDArray[np.float64], kind: Observation
+    ) -> tuple[Observed, dict[str, Any]]:
+        """Return what a reset does: the observation of a starting state, and what was drawn."""
+        self.forget()
+        return self.observe(state, kind), {"context": dict(self.context)} if self.varies else {}
 
     @property
-    def info(self) -> dict[str, Any]:
-        """What a reset tells."""
-        return {"context": dict(self.context)} if self._contexts else {}
+    def varies(self) -> bool:
+        """Whether each episode draws a model."""
+        return self._contexts is not None
+
+    @property
+    def _rng(self) -> np.random.Generator:
+        if self._chance is None:
+            raise ResetNeededError("Call reset before using step method.")
+        return self._chance.rng
 
     def space(self, space: spaces.Box) -> spaces.Box:
         """Return the space of what is seen where undisturbed it is this one."""
-        high = np.full_like(space.high, np.inf) if self.disturbances.blur_sensors else space.high
-        low = np.full_like(space.low, -np.inf) if self.disturbances.blur_sensors else space.low
+        low, high = space.low, space.high
+        if self.disturbances.blur_sensors:
+            # A cosine stays one, however wrong its angle is.
+            low, high = (np.where(np.abs(each) == 1.0, each, each * np.inf) for each in (low, high))
         ends = [(-1.0, 1.0)] * self.effects.actions
         if self.disturbances.observe_context:
             ends += [(min(each.bounds), max(each.bounds)) for each in self.disturbances.ranges]
@@ -111,23 +167,3 @@ class Disturber:
         return spaces.Box(
             np.concatenate([low, lows]), np.concatenate([high, highs]), dtype=np.float32
         )
-
-
-def pushed(
-    disturber: Disturber, see: Callable[[float], Any], applied: Any, slider: int, controls: Any  # noqa: ANN401
-) -> Callable[[float], Any]:
-    """Return what moves a simulation by a push, through the motor as it is disturbed.
-
-    Args:
-        disturber: Disturbs.
-        see: Moves it by a control.
-        applied: Its forces beside the motor's, by joint.
-        slider: The cart's joint.
-        controls: Those of the two actions.
-    """
-
-    def move(push: float) -> Any:  # noqa: ANN401
-        made, applied[slider] = disturber.actuate(push)
-        return see(control_of(made, controls))
-
-    return move

@@ -4,12 +4,14 @@ import dataclasses
 from collections.abc import Mapping
 from typing import Final
 
+from mjcartpole.disturbances.contexts import Context
 from mjcartpole.errors import check_known
 from mjcartpole.integrator import Integrator, check_integrator
 from mjcartpole.physics.cartpole import INTEGRATORS, CartPole, own_copy
 from mjcartpole.physics.edit.edits import edits_of
 from mjcartpole.physics.load import Edits, load_shared
 from mjcartpole.physics.simulation import Simulation
+from mjcartpole.physics.variants import variant
 
 KINEMATICS: Final = {"euler": "", "semi-implicit": "Euler"} | {
     name: name for name in INTEGRATORS.values() if name != "Euler"
@@ -50,11 +52,12 @@ class Editable:
         self.own = self.shown = self._load(changes)
         self._changes, self.is_stale = changes, True
 
-    def begin(self, edits: Edits = None) -> Simulation:
-        """A simulation of the model as it is now, with edits that last one episode."""
+    def begin(self, edits: Edits = None, context: Context | None = None) -> Simulation:
+        """A simulation of the model as it is now, with what lasts one episode: edits, a context."""
         changed = self._load(self._changes, edits) if edits else self.own
+        changed = variant(changed, context) if context else changed
         simulation = Simulation(own_copy(changed), self._integrator)
-        self.shown, self.is_stale = simulation.cartpole, bool(edits)
+        self.shown, self.is_stale = simulation.cartpole, bool(edits or context)
         return simulation
 
     def _load(self, changes: Mapping[str, object], edits: Edits = None) -> CartPole:

@@ -1,6 +1,6 @@
 """Gymnasium's own CartPole-v1 under the rules of another task."""
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import gymnasium
 import numpy as np
@@ -9,8 +9,10 @@ from gymnasium import spaces
 
 from mjcartpole.disturbances.disturbances import NONE, Disturbances
 from mjcartpole.envs.actions import action_space, invalid, push_of
-from mjcartpole.envs.disturber import Disturber
 from mjcartpole.task import Task, control_of
+
+if TYPE_CHECKING:
+    from mjcartpole.envs.disturber import Disturber
 
 Observation = npt.NDArray[np.float32]
 
@@ -34,15 +36,16 @@ class GymTask(gymnasium.Wrapper[Observation, np.int64, Observation, np.int64]):
         disturbances: Disturbances = NONE,
     ) -> None:
         super().__init__(env)
-        self.disturber = Disturber(disturbances, None, task) if disturbances.are_some else None
+        self.disturber = _disturber(disturbances, task) if disturbances.are_some else None
         self._task, self._cartpole = task, env.unwrapped
         self._force: float = self._cartpole.force_mag  # type: ignore[attr-defined]
         self._cartpole.x_threshold = task.x_limit  # type: ignore[attr-defined]
         self._cartpole.theta_threshold_radians = task.theta_limit  # type: ignore[attr-defined]
         bound = task.observation_bound()
         self.action_space = action_space(task)
-        space: Any = spaces.Box(-bound, bound, dtype=np.float32)
-        self.observation_space = self.disturber.space(space) if self.disturber else space
+        space = spaces.Box(-bound, bound, dtype=np.float32)
+        seen: Any = self.disturber.space(space) if self.disturber else space
+        self.observation_space = seen
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -55,7 +58,8 @@ class GymTask(gymnasium.Wrapper[Observation, np.int64, Observation, np.int64]):
             state = np.array([x, x_dot, theta + self._task.start_angle, theta_dot])
             self._cartpole.state = state  # type: ignore[attr-defined]
         if self.disturber:
-            self.disturber.begin(self._cartpole.np_random)
+            self.disturber.draw(self._cartpole.np_random)
+            self.disturber.forget()
         return self._observed(self._seen()), info
 
     def step(self, action: Any) -> tuple[Observation, float, bool, bool, dict[str, Any]]:  # noqa: ANN401
@@ -85,9 +89,15 @@ class GymTask(gymnasium.Wrapper[Observation, np.int64, Observation, np.int64]):
         return control_of(push, (-self._force, self._force)) + force
 
     def _observed(self, seen: npt.NDArray[np.float64]) -> Observation:
-        return self.disturber.sense(seen) if self.disturber else seen.astype(np.float32)
+        return self.disturber.observe(seen, "state") if self.disturber else seen.astype(np.float32)
 
     def _seen(self) -> npt.NDArray[np.float64]:
         """The state as the rules have it."""
         state = np.array(self._cartpole.state, dtype=np.float64)  # type: ignore[attr-defined]
         return self._task.seen(state)
+
+
+def _disturber(disturbances: Disturbances, task: Task) -> "Disturber":
+    from mjcartpole.envs.disturber import Disturber  # noqa: PLC0415 - it imports MuJoCo
+
+    return Disturber(disturbances, None, task)

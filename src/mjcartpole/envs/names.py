@@ -8,6 +8,7 @@ from typing import Any, Final
 import numpy as np
 from gymnasium import logger, spaces
 
+from mjcartpole.envs.disturber import Disturber
 from mjcartpole.envs.editable import Editable
 from mjcartpole.envs.observations import Observation, observation_space
 from mjcartpole.errors import ConfigError, MjCartPoleError, SettingError
@@ -150,6 +151,8 @@ class CartPoleNames:
     _observation: Observation
     _model: Editable
     _simulation: Simulation | None
+    disturber: Disturber | None = None
+    """Adds disturbances; None where nothing is added."""
     _limits: tuple[float, float, float, float]
     _steps_after_end: list[int | None]
 
@@ -220,7 +223,8 @@ class CartPoleNames:
         farthest = max(x, task.x_limit), max(theta, task.theta_limit)
         rules = dataclasses.replace(task, x_limit=farthest[0], theta_limit=farthest[1])
         poles = self._model.base.poles
-        self.observation_space = observation_space(rules, poles, self._observation)
+        space = observation_space(rules, poles, self._observation)
+        self.observation_space = self.disturber.space(space) if self.disturber else space
 
     @property
     def task(self) -> Task:

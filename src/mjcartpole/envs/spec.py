@@ -8,6 +8,7 @@ from typing import Any
 from gymnasium import logger
 from gymnasium.envs.registration import EnvSpec
 
+from mjcartpole.disturbances.disturbances import Disturbances
 from mjcartpole.envs.editable import Editable
 from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.load import is_its_document
@@ -61,6 +62,7 @@ def portable(spec: EnvSpec, cartpole: CartPole) -> EnvSpec:
 
 
 def _plain(value: Any) -> Any:  # noqa: ANN401 - whatever it is
+    value = value.given if isinstance(value, Disturbances) else value
     if isinstance(value, Task):
         return value.name
     if hasattr(value, "tolist"):

@@ -213,9 +213,7 @@ def _snapshot(
     seconds, curve = float(about["seconds"]), _evaluations(archive, config)
     visits = _added(archive, "state_visits", np.int64, learner.visits.size)
     states = about["env_rng"], about["learner_rng"]
-    snapshot = Snapshot(
-        found, *states, columns, seconds, curve, visits, about.get("chance_rng")
-    )
+    snapshot = Snapshot(found, *states, columns, seconds, curve, visits, about.get("chance_rng"))
     if snapshot.chance_rng is None and config.disturbances.are_some:
         raise ValueError("no generator for the disturbances of the config")
     _check_snapshot(snapshot, config.evaluation_period)

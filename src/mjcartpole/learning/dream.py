@@ -13,9 +13,7 @@ from mjcartpole.task import N_ACTIONS, Task
 Observation = npt.NDArray[np.float32]
 
 
-def look(
-    env: gymnasium.Env[Any, Any], steps: int, rng: np.random.Generator
-) -> tuple[Seen, int]:
+def look(env: gymnasium.Env[Any, Any], steps: int, rng: np.random.Generator) -> tuple[Seen, int]:
     """Play random actions in the world; returns what was seen, and in how many episodes.
 
     Args:

@@ -113,11 +113,7 @@ def play_episode(
     """
     observation, _ = env.reset(seed=seed)
     if start is not None:
-        env.unwrapped.state = np.array(start)  # type: ignore[attr-defined]
-        seen = _state_of(env)
-        if math.isinf(getattr(env.unwrapped, "theta_threshold_radians", 0.0)):
-            seen[2::2] = wrapped(seen[2::2])
-        observation = seen.astype(np.float32)
+        observation = _begin_at(env, start)
     states = [_state_of(env)]
     total, over, terminated = 0.0, False, False
     try:
@@ -129,6 +125,19 @@ def play_episode(
     except SimulationError as error:
         raise in_episode(error, number, len(states) - 1) from error
     return _ended(env, number, total, len(states) - 1, terminated), states
+
+
+def _begin_at(env: gymnasium.Env[Any, Any], start: Sequence[float]) -> npt.NDArray[np.float32]:
+    """Put an environment into a state; returns what is seen of it."""
+    env.unwrapped.state = np.array(start)  # type: ignore[attr-defined]
+    seen = _state_of(env)
+    if math.isinf(getattr(env.unwrapped, "theta_threshold_radians", 0.0)):
+        seen[2::2] = wrapped(seen[2::2])
+    disturber = env.get_wrapper_attr("disturber") if env.has_wrapper_attr("disturber") else None
+    if disturber is None:
+        return seen.astype(np.float32)
+    observation: npt.NDArray[np.float32] = disturber.first(seen, "state")[0]
+    return observation
 
 
 def _ended(

@@ -15,7 +15,7 @@ _kept: dict[tuple[str, str, bool, int, tuple[tuple[str, float], ...]], CartPole]
 
 
 def variant(base: CartPole, context: Context) -> CartPole:
-    """Return a model with other numbers, as its edited document has it; shared by all.
+    """Return the model that `load_model(base, edits=context)` is; shared by all.
 
     Raises:
         ConfigError: A number makes no sense.
@@ -24,8 +24,7 @@ def variant(base: CartPole, context: Context) -> CartPole:
     key = (base.xml, base.name, base.has_own_timestep, base.substeps, tuple(context.items()))
     found = _kept.get(key)
     if found is None:
-        own_timestep = base.has_own_timestep or "timestep" in context
-        found = load_shared(base, context, own_timestep=own_timestep)
+        found = load_shared(base, context, own_timestep=base.has_own_timestep)
         for oldest in list(_kept)[: len(_kept) - MOST + 1]:
             _kept.pop(oldest, None)
         _kept[key] = found
