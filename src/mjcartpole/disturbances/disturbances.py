@@ -18,7 +18,8 @@ from mjcartpole.disturbances.effects import QUEUE, Effects
 from mjcartpole.disturbances.ranges import Range, parse_ranges
 from mjcartpole.disturbances.shoves import LARGEST, Shove, parse_shove
 from mjcartpole.errors import ConfigError, check_known
-from mjcartpole.task import MOST_STEPS, Task, state_names
+from mjcartpole.rules import MOST_STEPS
+from mjcartpole.task import Task, state_names
 
 MOST_SHARE: Final = 1.0
 """Chances are shares of all control steps."""
