@@ -121,8 +121,8 @@ def test_foreign_files_are_refused(tmp_path, content):
 def test_a_later_version_is_named(tmp_path):
     path = tmp_path / "policy.json"
     some_policy().save(path)
-    path.write_text(path.read_text().replace('"version": 1', '"version": 4'))
-    with pytest.raises(PolicyFileError, match="has version 4; this mjcartpole reads versions 1, 2"):
+    path.write_text(path.read_text().replace('"version": 1', '"version": 5'))
+    with pytest.raises(PolicyFileError, match="has version 5; this mjcartpole reads versions 1, 2"):
         Policy.load(path)
 
 
@@ -141,3 +141,17 @@ def test_a_policy_plays_only_where_the_observation_is_its_own(bins):
     policy = Policy(grid, np.zeros((*bins, 2)))
     with pytest.raises(ConfigError, match=r"the policy is for .*, and here has 1 pole"):
         policy.check_fits(1, "here")
+
+
+def test_a_policy_that_looks_at_actions_before_is_written_and_read(tmp_path):
+    grid = Discretizer((1, 2, 1, 1, 2), (-1.0,) * 5, (1.0,) * 5, actions=1)
+    policy = Policy(grid, np.arange(8.0).reshape(1, 2, 1, 1, 2, 2))
+    policy.save(tmp_path / "policy.json")
+    read = Policy.load(tmp_path / "policy.json")
+    assert (read.discretizer, read.poles, read.actions) == (grid, 1, 1)
+    read.check_fits(1, "here")
+    read.check_fits(1, "here", actions=1)
+    with pytest.raises(ConfigError, match="looks at 1 actions before, and here shows 0"):
+        read.check_fits(1, "here", actions=0)
+    with pytest.raises(ConfigError, match="is for 1 pole, and here has 2 poles"):
+        read.check_fits(2, "here")
