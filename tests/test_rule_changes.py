@@ -133,3 +133,8 @@ def test_policies_of_different_rules_are_told_apart(changed, trained, here, caps
     assert f"{RULES.summary} and CartPole-v1 (500 steps)" in err
     assert "(60 steps, x_limit 0.6, theta_limit 0.5, start_low -0.2, " in err
     assert Task("own").summary == "own (500 steps)"
+
+
+def test_a_warning_is_of_the_rules_that_are_trained_by(here, capsys):
+    narrow = ["--theta-limit", "0.01", "--start-low", "0", "--start-high", "0"]
+    assert "hard to balance: " in call(["train", *QUICK, *narrow], capsys)[2]

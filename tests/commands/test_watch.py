@@ -304,3 +304,9 @@ def test_mistakes_are_told_at_once(file):
         Watch(file, episodes=0).run()
     with pytest.raises(ConfigError, match="integrator"):
         Watch(file, integrator="rk4").run()
+
+
+@pytest.mark.slow
+def test_the_presets_own_rules_are_played(file, capsys):
+    Watch(file, preset="swing-up", once=1, episodes=5, video=False).run()
+    assert "pole fell" not in capsys.readouterr().out

@@ -102,6 +102,7 @@ def test_what_is_hard_to_balance(case, integrator):
             Task("swing-up", theta_limit=math.inf),
             CARRIED,
         ),
+        ({"force": 1}, Task("leaning", start_angle=0.17, start_low=0.0), THROWN),
     ],
 )
 def test_it_depends_on_the_task(edits, task, advice):

@@ -29,9 +29,10 @@ def prepare(config: TrainConfig, how: TrainOptions) -> CartPole:
     cartpole = config.load_model()
     training_grid(config, cartpole)
     check_storable(cartpole)
-    why = why_unplayable(cartpole, config.integrator) if config.backend == "mujoco" else None
-    if why:
-        print(f"mjcartpole: {why}", file=sys.stderr)
+    if config.backend == "mujoco":
+        why = why_unplayable(cartpole, config.integrator, task=config.rules)
+        if why:
+            print(f"mjcartpole: {why}", file=sys.stderr)
     return cartpole
 
 

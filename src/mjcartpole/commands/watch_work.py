@@ -24,7 +24,7 @@ from mjcartpole.studies.film import play
 from mjcartpole.studies.parity import Result, Subject, run_ladder
 from mjcartpole.studies.policy_setup import PolicySetup
 from mjcartpole.studies.video_options import VideoOptions
-from mjcartpole.task import CARTPOLE_V1
+from mjcartpole.task import Task
 
 RUNGS: Final = (2, 3, 4)
 """Of the ladder: those that take no time."""
@@ -105,7 +105,7 @@ class WatchWork:
         print(f"\n{time.strftime('%H:%M:%S')}  {self.watched.path}", flush=True)
         cartpole = self.config.load_model()
         sketch = VIDEOS / f"{name}-sketch.png"
-        _draw_sketch(cartpole, sketch)
+        _draw_sketch(cartpole, sketch, self.config.rules)
         _say("sketch", f"{sketch}, {time.perf_counter() - started:.1f} s")
         self.watched.check()
         self._hold_against_itself(cartpole)
@@ -113,12 +113,17 @@ class WatchWork:
         integrator = result.config.integrator
         episodes = _count_evaluated(result)
         evaluation = evaluate(
-            result.policy, model=cartpole, integrator=integrator, episodes=episodes
+            result.policy,
+            model=cartpole,
+            integrator=integrator,
+            task=self.config.rules,
+            episodes=episodes,
         )
         _say("greedy", _greedy(evaluation))
         self.watched.check()
         if self.video:
-            setup = PolicySetup(name, result.policy, "mujoco", cartpole, integrator)
+            rules = self.config.rules
+            setup = PolicySetup(name, result.policy, "mujoco", cartpole, integrator, task=rules)
             self._film(setup, VIDEOS / f"{name}.mp4")
         _say("done", f"in {time.perf_counter() - started:.1f} s")
 
@@ -168,9 +173,9 @@ class WatchWork:
         _say("video", f"{video.path} ({what_happened(casts)}; drawn by {drawn_by})")
 
 
-def _draw_sketch(cartpole: CartPole, path: Path) -> None:
+def _draw_sketch(cartpole: CartPole, path: Path, task: Task) -> None:
     """Draw a picture that needs no OpenGL, and no waiting."""
-    with open_renderer(cartpole, kind="sketch") as renderer:
+    with open_renderer(cartpole, kind="sketch", task=task) as renderer:
         picture = Image.fromarray(renderer.render((0.0, 0.0, *(LEAN, 0.0) * cartpole.poles)))
     with atomic_write(path) as temporary:
         picture.save(temporary)
@@ -191,7 +196,7 @@ def affordable(now: TrainResult) -> int:
     asked = now.config.episodes
     if now.seconds < _TRIAL:
         return asked
-    seconds_per_episode = now.seconds / now.steps * CARTPOLE_V1.time_limit
+    seconds_per_episode = now.seconds / now.steps * now.config.rules.time_limit
     left = asked - len(now.returns)
     if now.seconds + left * seconds_per_episode <= PATIENCE:
         return asked
@@ -200,7 +205,7 @@ def affordable(now: TrainResult) -> int:
 
 def _count_evaluated(result: TrainResult) -> int:
     """Return how many greedy episodes there is time for, should all last to the time limit."""
-    seconds_per_episode = result.seconds / max(result.steps, 1) * CARTPOLE_V1.time_limit
+    seconds_per_episode = result.seconds / max(result.steps, 1) * result.config.rules.time_limit
     return max(_LEAST_EVALUATED, min(EVALUATED, int(EVALUATION_PATIENCE / seconds_per_episode)))
 
 

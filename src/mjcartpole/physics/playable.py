@@ -17,6 +17,7 @@ import numpy as np
 
 from mjcartpole.errors import SimulationError
 from mjcartpole.integrator import Integrator
+from mjcartpole.physics.bodies import starting_state
 from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.simulation import Simulation, State
 from mjcartpole.task import CARTPOLE_V1, Task, max_abs
@@ -63,7 +64,7 @@ def why_unplayable(
         task.start_low, task.start_high, (STARTS, search.simulation.size)
     )
     try:
-        lost = search.lost(starts.tolist())
+        lost = search.lost((starts + starting_state(cartpole, task)).tolist())
     except SimulationError:
         return None  # It says so itself when it is run.
     if len(lost) < LEAST_LOST:
