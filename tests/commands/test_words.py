@@ -18,6 +18,10 @@ from mjcartpole.commands.words import LISTS, rewritten, value_of
         ("--set a=1 b=2 run", "run --set a=1 b=2"),
         ("--set a run", "run --set a"),
         ("--set=a=1 --seed 3", "--seed 3 --set a=1"),
+        ("--vary a.b=1:2 --vary c.d=1,2", "--vary a.b=1:2 c.d=1,2"),
+        ("--vary=a.b=1:2 x --vary c.d=3", "x --vary a.b=1:2 c.d=3"),
+        ("--push -1@2s -2@~1s run", "run --push -1@2s -2@~1s"),
+        ("--push 1@2s --set a=1", "--set a=1 --push 1@2s"),
         ("-x.xml -o=-y.png --a-b.xml", "./-x.xml -o=-y.png --a-b.xml"),
     ],
 )

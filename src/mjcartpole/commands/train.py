@@ -10,6 +10,7 @@ from mjcartpole.commands.method_flags import lacking
 from mjcartpole.commands.options import Command, Included
 from mjcartpole.commands.train_options import RunLocation, TrainOptions
 from mjcartpole.commands.words import value_of
+from mjcartpole.disturbances.disturbances import Disturbances
 from mjcartpole.errors import ConfigError
 from mjcartpole.learning.config import TrainConfig
 
@@ -36,7 +37,7 @@ class Train(Command):
     @classmethod
     def explain(cls, words: Sequence[str]) -> str | None:
         """Return which option the method lacks, and what it has."""
-        groups = (cls, RunLocation, TrainOptions, TrainConfig)
+        groups = (cls, RunLocation, TrainOptions, TrainConfig, Disturbances)
         others = [each.name for group in groups for each in dataclasses.fields(group)]
         said = lacking(words, cls.default(words).config.method, others)
         if said and value_of("--resume", words, ""):

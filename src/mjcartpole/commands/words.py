@@ -22,23 +22,36 @@ _DASHED_FILE = re.compile(r"-(?!-|o=).+\.(mp4|gif|webp|png|svg|pdf|csv|xml|json)
 """A file whose name begins with a dash: no flag with a single one looks like this."""
 
 
+_GATHERED: Final = {"--set": "=", "--vary": "=", "--push": "@"}
+"""Flags whose values may stand in several places, and what each value has in it."""
+
+
 def rewritten(words: Sequence[str]) -> list[str]:
-    """Return the words with all edits after one `--set`, wherever and however often they stood."""
+    """Return the words with all edits after one `--set`, wherever and however often they stood.
+
+    The same goes for what varies, and for shoves.
+    """
     words = [part for word in words for part in _SHORT.get(word, (word,))]
     words = [f"./{word}" if _DASHED_FILE.fullmatch(word) else word for word in words]
-    others, edits, follows, first = [], list[str](), False, False
+    for flag, sign in _GATHERED.items():
+        words = _gathered(words, flag, sign)
+    return words
+
+
+def _gathered(words: Sequence[str], flag: str, sign: str) -> list[str]:
+    others, values, follows, first = list[str](), list[str](), False, False
     for word in words:
-        if word == "--set" or word.startswith("--set="):
-            edits += [word.removeprefix("--set=")] if "=" in word else []
+        if word == flag or word.startswith(f"{flag}="):
+            values += [word.removeprefix(f"{flag}=")] if "=" in word else []
             follows, first = True, "=" not in word
-        elif follows and (first or "=" in word) and not word.startswith("-"):
-            # The first one is meant as an edit, even where it is none.
-            edits.append(word)
+        elif follows and (first or sign in word) and (sign == "@" or not word.startswith("-")):
+            # The first one is meant as a value, even where it is none.
+            values.append(word)
             first = False
         else:
             follows = False
             others.append(word)
-    return [*others, "--set", *edits] if edits else others
+    return [*others, flag, *values] if values else others
 
 
 def value_of(flag: str, words: Sequence[str], otherwise: str) -> str:

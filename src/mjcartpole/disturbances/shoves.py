@@ -26,8 +26,10 @@ class Shove(NamedTuple):
     @property
     def text(self) -> str:
         """As a person writes it."""
-        when = f"~{self.every:.17g}" if self.at is None else f"{self.at:.17g}"
-        return f"{self.impulse:.17g}@{when}s"
+        when = "~" if self.at is None else ""
+        time = self.every if self.at is None else self.at
+        impulse, seconds = (repr(each).removesuffix(".0") for each in (self.impulse, time))
+        return f"{impulse}@{when}{seconds}s"
 
     def row(self, control_step: float, task: Task) -> tuple[float, float, float]:
         """Return force (N), the step that it is given in (-1 at random), and the chance of one.
