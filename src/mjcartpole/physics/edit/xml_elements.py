@@ -96,14 +96,14 @@ class Parts:
 
     def motor(self) -> Element:
         """Return the element of the motor that the actions control."""
-        sections = [child for child in self.document.root.children if child.tag == "actuator"]
+        sections = self.document.root.find("actuator")
         return [child for section in sections for child in section.children][self.cartpole.motor]
 
     def inertial(self, body: int) -> Element | None:
         """Return the <inertial> that decides a body's mass; None where geoms do."""
         found = self.body(body).find("inertial")
-        compilers = [each for each in self.document.root.children if each.tag == "compiler"]
-        said = [each.attributes.get("inertiafromgeom", "") for each in compilers]
+        # An attribute of <compiler> alone.
+        said = [each.attributes.get("inertiafromgeom") for each in self.document.root.children]
         from_geoms = [each for each in said if each][-1:] == ["true"]
         return found[0] if found and not from_geoms else None
 
