@@ -34,5 +34,7 @@ class Study(Command):
         file = self.words[0]
         if self.how.resume and self.how.overwrite:
             raise ConfigError("--resume goes on with what is there, and --overwrite removes it")
+        if self.how.scheduler and self.how.workers is not None:
+            raise ConfigError("--workers is for this machine; a scheduler has its own")
         folder = self.how.run_dir or STUDIES / file.stem
         return study_run.run(file, folder, self.how)

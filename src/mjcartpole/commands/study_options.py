@@ -20,5 +20,8 @@ class StudyOptions:
     """Say how many points, runs and steps it is, and how long it may take; nothing is kept."""
     workers: int | None = None
     """How many runs at once; as many as there are cores if left out."""
+    scheduler: str | None = None
+    """Address of a Dask scheduler, such as tcp://127.0.0.1:8786: the runs are done by its workers,
+    which need nothing but mjcartpole."""
     engine: Engine = "compiled"
     """Who runs the loop; both give the same bits."""

@@ -1,5 +1,6 @@
 """A study, from its file to its tables."""
 
+import contextlib
 import shlex
 import sys
 from collections.abc import Sequence
@@ -12,6 +13,7 @@ from mjcartpole.commands.study_options import StudyOptions
 from mjcartpole.cores import worker_count
 from mjcartpole.physics.simulation import silence_mujoco
 from mjcartpole.signals import Interrupted, StopSignals
+from mjcartpole.studies.study.cluster import connected, run_there, threads_of
 from mjcartpole.studies.study.expect import expect
 from mjcartpole.studies.study.folder import claimed_study
 from mjcartpole.studies.study.measures import MEASURES
@@ -32,25 +34,26 @@ def run(file: Path, folder: Path, how: StudyOptions) -> int:
         Interrupted: After Ctrl-C, SIGTERM or SIGHUP, when what is done is kept.
     """
     silence_mujoco()
-    planned = plan(read_study(file), how.engine)
-    if how.dry_run:
-        return _dry_run(planned, folder, how)
-    signals = StopSignals()
-    claim = claimed_study(folder, planned.study.text, resume=how.resume, overwrite=how.overwrite)
-    with signals.caught(), claim:
-        log = RecordLog(folder)
-        left = left_of(planned, log)
-        _print_head(planned, left, log)
-        with signals.deferred():
-            found = run_here(left, how.workers, signals.stop)
-            progress.study_runs(keep(found, log), len(left))
-        digest = write_tables(folder, planned, log.found)
-        return _tell(
-            planned, log, folder, digest, signals, f"mjcartpole study {shlex.quote(str(file))}"
-        )
+    planned, signals = plan(read_study(file), how.engine), StopSignals()
+    cluster = connected(how.scheduler) if how.scheduler else contextlib.nullcontext()
+    with signals.caught(), cluster as client:
+        if how.dry_run:
+            return _dry_run(planned, folder, how, threads_of(client) if client else how.workers)
+        with claimed_study(folder, planned.study.text, how.resume, how.overwrite):
+            log = RecordLog(folder)
+            left = left_of(planned, log)
+            _print_head(planned, left, log)
+            with signals.deferred():
+                there = run_there(left, client, signals.stop) if client else None
+                here = there or run_here(left, how.workers, signals.stop)
+                progress.study_runs(keep(here, log), len(left))
+            digest = write_tables(folder, planned, log.found)
+            print(f"\nstudy  {folder}\ntable  {folder / RUNS}\ndigest {digest}")
+            again = f"mjcartpole study {shlex.quote(str(file))}"
+            return _tell_failed(planned, log, folder, signals, again)
 
 
-def _dry_run(planned: Plan, folder: Path, how: StudyOptions) -> int:
+def _dry_run(planned: Plan, folder: Path, how: StudyOptions, workers: int | None) -> int:
     left = left_of(planned, RecordLog(folder)) if how.resume else unique(planned)
     _print_size(planned)
     for name in planned.study.measure:
@@ -58,7 +61,7 @@ def _dry_run(planned: Plan, folder: Path, how: StudyOptions) -> int:
     if how.resume:
         print(f"left     {counted(len(left), 'run')}")
     if left:
-        expected, workers = expect(left), worker_count(how.workers, len(left))
+        expected, workers = expect(left), worker_count(workers, len(left))
         print(
             f"steps    about {expected.steps:.2g}\n"
             f"time     about {in_time(expected.seconds / workers)} with {workers} at once"
@@ -97,12 +100,12 @@ def _print_head(planned: Plan, left: Sequence[PlannedRun], log: RecordLog) -> No
     sys.stdout.flush()
 
 
-def _tell(
-    planned: Plan, log: RecordLog, folder: Path, digest: str, signals: StopSignals, again: str
+def _tell_failed(
+    planned: Plan, log: RecordLog, folder: Path, signals: StopSignals, again: str
 ) -> int:
+    """Say what failed and what is not done, and return the exit code."""
     left = left_of(planned, log)
     failed = [run for run in planned.runs if run.key in log.found and log.found[run.key].error]
-    print(f"\nstudy  {folder}\ntable  {folder / RUNS}\ndigest {digest}")
     for run in failed[:SHOWN]:
         where = f"{in_words(run.factors)} seed={run.job.config.seed}"
         print(f"mjcartpole: error: {where} failed: {log.found[run.key].error}", file=sys.stderr)

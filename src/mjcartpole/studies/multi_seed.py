@@ -186,13 +186,19 @@ def _result_of(future: Future[SeedResult], seed: int) -> SeedResult:
         return SeedResult(seed, error=f"its process ended: {error}")
 
 
-def train_seed(job: SeedJob, stop: Stop) -> SeedResult:
-    """Return what a seed comes to; nothing, if it is to stop before it is done."""
+def train_seed(job: SeedJob, stop: Stop, cartpole: CartPole | None = None) -> SeedResult:
+    """Return what a seed comes to; nothing, if it is to stop before it is done.
+
+    Args:
+        job: What is to be trained.
+        stop: Says when to stop.
+        cartpole: The job's model, if it is loaded already.
+    """
     seed = job.config.seed
     if stop():
         return SeedResult(seed)
     try:
-        cartpole = model_of(job)
+        cartpole = cartpole or model_of(job)
         if job.folder is None:
             return _train_in_memory(job, cartpole, stop)
         return _train_on_disk(job, job.folder, cartpole, stop)

@@ -26,7 +26,7 @@ FILES: Final = (LOG, RUNS, CURVES, PARQUET, *REPORTS, STUDY)
 
 
 @contextlib.contextmanager
-def claimed_study(folder: Path, text: str, *, resume: bool, overwrite: bool) -> Iterator[None]:
+def claimed_study(folder: Path, text: str, resume: bool, overwrite: bool) -> Iterator[None]:
     """Hold a study's folder, and write what is asked into it.
 
     Raises:

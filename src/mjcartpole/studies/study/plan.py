@@ -3,7 +3,7 @@
 import dataclasses
 import json
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Final, Self
 
 from mjcartpole.errors import ConfigError, ModelError
@@ -33,12 +33,14 @@ class PlannedRun:
         point: Number of its point, from 1 on.
         factors: The point.
         job: What is to be trained.
+        cartpole: Its model.
     """
 
     key: str
     point: int
     factors: Point
     job: SeedJob
+    cartpole: CartPole = field(repr=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +125,9 @@ def _runs(
     job = SeedJob(config, chosen, document, evaluated=plays_after(study.measure))
     for seed in study.seeds:
         one = job.of(seed)
-        yield PlannedRun(_key(one.config, digest if on_mujoco else ""), number, point, one)
+        yield PlannedRun(
+            _key(one.config, digest if on_mujoco else ""), number, point, one, cartpole
+        )
 
 
 def _key(config: TrainConfig, digest: str) -> str:

@@ -5,7 +5,6 @@ A process that is killed leaves at most one line that is cut short; that run is 
 
 import contextlib
 import json
-import os
 import socket
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -13,8 +12,9 @@ from pathlib import Path
 from typing import BinaryIO, Final, Self
 
 from mjcartpole.errors import FileError
-from mjcartpole.files import brief, is_there, opened
+from mjcartpole.files import brief, is_there, opened, sync
 from mjcartpole.learning.stored import Fields, checked, parse
+from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.studies.multi_seed import OUT_OF_MEMORY, SeedJob, train_seed
 from mjcartpole.studies.side_by_side import Stop
 from mjcartpole.studies.study.measures import APART, MEASURES, curve_of, figures_of
@@ -94,9 +94,16 @@ def versions() -> dict[str, str]:
     return {name: version_of(name) or "not installed" for name in PACKAGES}
 
 
-def do_run(key: str, job: SeedJob, stop: Stop) -> Record | None:
-    """Train, and return what it came to; None if it was to stop, or has no memory here."""
-    found = train_seed(job, stop)
+def do_run(key: str, job: SeedJob, stop: Stop, cartpole: CartPole | None = None) -> Record | None:
+    """Train, and return what it came to; None if it was to stop, or has no memory here.
+
+    Args:
+        key: See `PlannedRun`.
+        job: What is to be trained.
+        stop: Says when to stop.
+        cartpole: The model, if it is loaded already; it is this run's own.
+    """
+    found = train_seed(job, stop, cartpole)
     result = found.result
     if result is None:
         lasting = found.error and found.error != OUT_OF_MEMORY
@@ -162,17 +169,21 @@ class RecordLog:
         Raises:
             FileError: The file cannot be written.
         """
+        with self._written(), self.path.open("ab") as file:
+            file.write(b"\n" if self._is_cut else b"")
+
+        def add(record: Record) -> None:
+            with self._written(), self.path.open("ab") as file:
+                file.write(record.line())
+            self.found[record.key] = record
+
+        yield add
+        with self._written():
+            sync(self.path)
+
+    @contextlib.contextmanager
+    def _written(self) -> Iterator[None]:
         try:
-            with self.path.open("ab") as file:
-
-                def add(record: Record) -> None:
-                    file.write(record.line())
-                    file.flush()
-                    self.found[record.key] = record
-
-                if self._is_cut:
-                    file.write(b"\n")
-                yield add
-                os.fsync(file.fileno())
+            yield
         except OSError as error:
             raise FileError(f"cannot write '{self.path}': {brief(error)}") from error

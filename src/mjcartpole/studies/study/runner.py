@@ -1,9 +1,11 @@
 """A study at work: what is not done yet is done, and each run is kept as soon as it has come."""
 
 from collections.abc import Iterator, Sequence
-from concurrent.futures import BrokenExecutor, Future
+from concurrent.futures import BrokenExecutor, CancelledError, Future
+from typing import Any
 
 from mjcartpole.cores import worker_count
+from mjcartpole.studies.multi_seed import SeedJob
 from mjcartpole.studies.side_by_side import Found, Stop, side_by_side
 from mjcartpole.studies.study.plan import Plan, PlannedRun
 from mjcartpole.studies.study.records import Record, RecordLog, do_run
@@ -26,7 +28,7 @@ def _is_done(run: PlannedRun, plan: Plan, log: RecordLog) -> bool:
     return record is not None and record.has(plan.study.measure)
 
 
-def run_here(runs: Runs, workers: int | None, stop: Stop) -> Found[PlannedRun, Record | None]:
+def run_here(runs: Runs, workers: int | None, stop: Stop) -> Found[Any, Record | None]:
     """Do runs on this machine: see `side_by_side`.
 
     Raises:
@@ -34,15 +36,15 @@ def run_here(runs: Runs, workers: int | None, stop: Stop) -> Found[PlannedRun, R
     """
     # The compiled engine leaves Python's lock alone.
     threads = all(run.job.engine == "compiled" for run in runs)
-    jobs = (run for run in runs if not stop())
+    jobs = ((run.key, run.job) for run in runs if not stop())
     return side_by_side(_do, jobs, worker_count(workers, len(runs)), stop, threads=threads)
 
 
-def _do(run: PlannedRun, stop: Stop) -> Record | None:
-    return do_run(run.key, run.job, stop)
+def _do(run: tuple[str, SeedJob], stop: Stop) -> Record | None:
+    return do_run(*run, stop)
 
 
-def keep(found: Found[PlannedRun, Record | None], log: RecordLog) -> Iterator[Record | None]:
+def keep(found: Found[Any, Record | None], log: RecordLog) -> Iterator[Record | None]:
     """Write each result into the log as it comes.
 
     Yields:
@@ -62,5 +64,5 @@ def keep(found: Found[PlannedRun, Record | None], log: RecordLog) -> Iterator[Re
 def _result_of(future: Future[Record | None]) -> Record | None:
     try:
         return future.result()
-    except (BrokenExecutor, OSError, MemoryError):
+    except (BrokenExecutor, CancelledError, OSError):
         return None  # Its process was killed: the run is as if it had not begun.
