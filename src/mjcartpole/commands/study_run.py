@@ -44,12 +44,15 @@ def run(file: Path, folder: Path, how: StudyOptions) -> int:
             left = left_of(planned, log)
             _print_head(planned, left, log)
             with signals.deferred():
-                there = run_there(left, client, signals.stop) if client else None
-                here = there or run_here(left, how.workers, signals.stop)
-                progress.study_runs(keep(here, log), len(left))
+                if client:
+                    found = run_there(left, client, signals.stop)
+                else:
+                    found = run_here(left, how.workers, signals.stop)
+                progress.study_runs(keep(found, log), len(left))
             digest = write_tables(folder, planned, log.found)
             print(f"\nstudy  {folder}\ntable  {folder / RUNS}\ndigest {digest}")
-            again = f"mjcartpole study {shlex.quote(str(file))}"
+            there = f" --scheduler {how.scheduler}" if how.scheduler else ""
+            again = f"mjcartpole study {shlex.quote(str(file))}{there}"
             return _tell_failed(planned, log, folder, signals, again)
 
 
