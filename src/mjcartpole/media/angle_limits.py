@@ -123,3 +123,7 @@ def _arc(start: float, end: float) -> Points:
 
 def _rgba(opacity: float) -> npt.NDArray[np.float32]:
     return np.array([*_COLOUR, opacity], dtype=np.float32)
+
+
+EDGE_RGBA: Final = _rgba(_EDGE)
+"""What a limit is drawn in."""

@@ -17,6 +17,7 @@ import numpy.typing as npt
 from mjcartpole.errors import RenderError
 from mjcartpole.media.angle_limits import Fan, Wedge, box_corners
 from mjcartpole.media.quality import DEFAULT_QUALITY, Quality, level_of
+from mjcartpole.media.track_limits import Posts
 from mjcartpole.media.view import Points, View
 from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.structure import directions
@@ -53,7 +54,7 @@ class Scene:
         level: How much work goes into it.
         abstract: MuJoCo's scene, filled by `show`: the model's own geoms first, then the fans.
         n_geoms: How many of the geoms in it are the model's own.
-        wedges: The parts of the fans, one for each pole.
+        wedges: The parts of the fans, one for each pole, and the posts at the track's limits.
     """
 
     def __init__(
@@ -88,7 +89,8 @@ class Scene:
         self.n_geoms = 0
         self.wedges: list[Wedge] = []
         self._joints = list(cartpole.joints)
-        self._fans = [Fan(cartpole, pole, task) for pole in range(cartpole.poles)]
+        fans = [Fan(cartpole, pole, task) for pole in range(cartpole.poles)]
+        self._limits: list[Fan | Posts] = [*fans, Posts(cartpole, task)]
         self._view: View | None = None
         self._moving = np.flatnonzero(~_is_fixed(self.model, self.model.geom_bodyid))
         self.is_still = _is_view_still(self.model, self._camera)
@@ -136,7 +138,7 @@ class Scene:
         if self._view is None or not self.is_still:
             self._view = View.of(self.abstract, self.width, self.height)
         self.n_geoms = self.abstract.ngeom
-        self.wedges = [wedge for fan in self._fans for wedge in fan.wedges(data)]
+        self.wedges = [wedge for limit in self._limits for wedge in limit.wedges(data)]
         for wedge in self.wedges:
             _add_wedge(self.abstract, wedge, self.view)
 
