@@ -2,22 +2,24 @@
 
 import copy
 import functools
-from typing import Any, Final, Literal, Unpack, get_args
+from collections.abc import Mapping
+from typing import Any, Final, cast
 
 import numpy as np
 import numpy.typing as npt
-from gymnasium import logger
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
+from mjcartpole.disturbances.disturbances import Disturbances
 from mjcartpole.envs.actions import action_space, controls_of_choices, controls_of_pushes
+from mjcartpole.envs.disturbers import Disturbers
 from mjcartpole.envs.names import FixedNames
 from mjcartpole.envs.observations import Observation, observation_space, observed
 from mjcartpole.envs.options import rules_of, start_bounds
-from mjcartpole.envs.registration import ENV_ID
+from mjcartpole.envs.vector_pictures import VectorPictures, VectorRenderMode, check_render_mode
 from mjcartpole.errors import ConfigError, ResetNeededError
 from mjcartpole.integrator import Integrator
-from mjcartpole.media.renderer import DEFAULT_HEIGHT, DEFAULT_WIDTH, Renderer, open_renderer
+from mjcartpole.media.renderer import DEFAULT_HEIGHT, DEFAULT_WIDTH, open_renderer
 from mjcartpole.media.scene import DEFAULT_CAMERA, check_picture
 from mjcartpole.physics.batch_simulation import BatchSimulation
 from mjcartpole.physics.bodies import starting_state
@@ -32,8 +34,6 @@ from mjcartpole.task import (
     worst_pole,
 )
 
-VectorRenderMode = Literal["rgb_array", "rgb_array_list"]
-
 _DEFAULT_PICTURE: Final = (DEFAULT_WIDTH, DEFAULT_HEIGHT, DEFAULT_CAMERA)
 
 _EVERYONE: Final = slice(None)
@@ -41,7 +41,9 @@ _NOBODY: Final = np.empty(0, dtype=np.intp)
 
 
 class CartPoleVectorEnv(
-    FixedNames, VectorEnv[npt.NDArray[np.float32], npt.NDArray[np.integer[Any]], npt.NDArray[Any]]
+    VectorPictures,
+    FixedNames,
+    VectorEnv[npt.NDArray[np.float32], npt.NDArray[np.integer[Any]], npt.NDArray[Any]],
 ):
     """Many copies of CartPole-v1, moved together by MuJoCo on all cores.
 
@@ -97,6 +99,7 @@ class CartPoleVectorEnv(
     | `x_limit`, `theta_limit`, `start_low`, `start_high`, `start_angle`, `reward` | | the task's | As in `CartPoleEnv` |
     | `sutton_barto_reward` | bool                   | False       | 0 per step and -1 at termination, instead of 1 per step |
     | `observation`         | "state" or "trig"      | "state"     | As in `CartPoleEnv`           |
+    | `disturbances`        | dict, Disturbances     | None        | As in `CartPoleEnv`, each also by itself; every environment has its own |
     | `threads`             | int or None            | None        | Threads that step; None: as many as pay, which the time decides |
     | `render_mode`         | None, "rgb_array", "rgb_array_list" | None | Nothing, or one picture per environment (the two are the same, as in gymnasium's vector) |
     | `width`, `height`     | int                    | 640, 480    | Size of a picture, in pixels  |
@@ -139,7 +142,8 @@ class CartPoleVectorEnv(
         width: int = DEFAULT_WIDTH,
         height: int = DEFAULT_HEIGHT,
         camera: str = DEFAULT_CAMERA,
-        **rules: Unpack[Changes],
+        disturbances: Disturbances | Mapping[str, Any] | None = None,
+        **more: Any,  # noqa: ANN401 - rules and disturbances
     ) -> None:
         """Load the model; nothing is drawn and no OpenGL is touched until `render`.
 
@@ -151,32 +155,39 @@ class CartPoleVectorEnv(
             RenderError: The size of a picture makes no sense, or the model has no such camera.
         """
         self.num_envs = _count("num_envs", num_envs)
-        self._task = rules_of(task, rules, sutton_barto_reward=sutton_barto_reward)
+        added = Disturbances.taken_from(more, disturbances)
+        self._task = rules_of(task, cast(Changes, more), sutton_barto_reward=sutton_barto_reward)
         self._observation = observation
         steps = self._task.time_limit if max_episode_steps is None else max_episode_steps
         self.max_episode_steps = _count("max_episode_steps", steps)
         threads = None if threads is None else _count("threads", threads)
-        _check_render_mode(render_mode)
+        check_render_mode(render_mode)
         self.render_mode = render_mode
         self.cartpole = load_model(model, edits, own_timestep=own_timestep)
         self._simulation = BatchSimulation(self.cartpole, self.num_envs, integrator, threads)
         if render_mode is not None or (width, height, camera) != _DEFAULT_PICTURE:
             check_picture(self.cartpole, width, height, camera)
         self.metadata = self.metadata | {"render_fps": frame_rate(self.cartpole.control_step)}
-        self.single_observation_space = observation_space(
-            self._task, self.cartpole.poles, observation
+        self._disturbers = None
+        controls, space = (
+            self.cartpole.controls,
+            observation_space(self._task, self.cartpole.poles, observation),
         )
+        if added.are_some:
+            self._disturbers = Disturbers(added, self.cartpole, self._task, self.num_envs)
+            controls, space = (-1.0, 1.0), self._disturbers.members[0].space(space)
+        self.single_observation_space = space
         self.single_action_space = action_space(self._task)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         interpret = controls_of_pushes if self._task.continuous else controls_of_choices
-        controls = np.array(self.cartpole.controls)
-        self._controls_of = functools.partial(interpret, space=self.action_space, controls=controls)
+        self._controls_of = functools.partial(
+            interpret, space=self.action_space, controls=np.array(controls)
+        )
         self._prepare_episodes()
         self._open_renderer = functools.partial(
-            open_renderer, self.cartpole, width=width, height=height, camera=camera, task=self._task
+            open_renderer, width=width, height=height, camera=camera, task=self._task
         )
-        self._renderer: Renderer | None = None
 
     def _prepare_episodes(self) -> None:
         """Make what lives from step to step."""
@@ -222,6 +233,8 @@ class CartPoleVectorEnv(
                 f"not the shape {values.shape}"
             )
         self._simulation.set_state(_EVERYONE, values.T)
+        if self._disturbers:
+            self._disturbers.forget()
         self._has_state = True
 
     def reset(
@@ -245,11 +258,11 @@ class CartPoleVectorEnv(
         who = self._mask((options or {}).get("reset_mask"))
         super().reset(seed=seed)
         self._bounds = bounds
-        self._simulation.set_state(who, self._draw(who.size))
+        self._restart(who)
         self._has_state = True
         self._deadlines[who] = self._clock + self.max_episode_steps
         self._ended = np.setdiff1d(self._ended, who, assume_unique=True)
-        return observed(self._simulation.state, self._task, self._observation), {}
+        return self._observe(), self._info(who)
 
     def _mask(self, mask: object) -> npt.NDArray[np.intp]:
         """Indices of the environments that a reset is for."""
@@ -296,12 +309,14 @@ class CartPoleVectorEnv(
         controls = self._controls_of(actions)
         if not self._has_state:
             raise ResetNeededError("Call reset before using step method.")
+        restarted = self._ended
+        if self._disturbers:
+            controls = self._disturbers.act(controls, restarted, self._simulation)
         self._simulation.step(controls)
         self._clock += 1
-        restarted = self._ended
         if restarted.size:
             # Their step is thrown away, as gymnasium does: cheaper than to choose who steps.
-            self._simulation.set_state(restarted, self._draw(restarted.size))
+            self._restart(restarted)
             self._deadlines[restarted] = self._clock + self.max_episode_steps
         terminations = self._have_terminated()
         truncations = self._deadlines <= self._clock
@@ -310,13 +325,26 @@ class CartPoleVectorEnv(
             rewards[restarted] = 0.0
             terminations[restarted] = False
         self._ended = np.logical_or(terminations, truncations).nonzero()[0]
-        return (
-            observed(self._simulation.state, self._task, self._observation),
-            rewards,
-            terminations,
-            truncations,
-            {},
-        )
+        return self._observe(), rewards, terminations, truncations, self._info(restarted)
+
+    def _restart(self, who: npt.NDArray[np.intp]) -> None:
+        if self._disturbers:
+            self._disturbers.begin(who.tolist(), self._simulation, self.np_random)
+        self._simulation.set_state(who, self._draw(who.size))
+
+    def _observe(self) -> npt.NDArray[np.float32]:
+        states = self._simulation.state
+        if self._disturbers:
+            return self._disturbers.observe(range(self.num_envs), states, self._observation)
+        return observed(states, self._task, self._observation)
+
+    def _info(self, started: npt.NDArray[np.intp]) -> dict[str, Any]:
+        """What is told of environments that begin an episode."""
+        info: dict[str, Any] = {}
+        if self._disturbers and self._disturbers.vary:
+            for index, own in self._disturbers.infos(started.tolist()):
+                info = self._add_info(info, own, index)
+        return info
 
     def _have_terminated(self) -> npt.NDArray[np.bool_]:
         """Whose state is beyond a limit, shape (num_envs,); a new array."""
@@ -346,47 +374,9 @@ class CartPoleVectorEnv(
         drawn = self.np_random.uniform(low=low, high=high, size=size).T
         return drawn + self._middle if self._task.start_angle else drawn
 
-    def render(self) -> tuple[npt.NDArray[np.uint8], ...] | None:
-        """Draw the current states.
-
-        Returns:
-            One array of shape (height, width, 3) per environment; None without a render mode,
-            which warns, and before the first reset.
-
-        Raises:
-            RenderError: No picture can be made.
-        """
-        if self.render_mode is None:
-            logger.warn(
-                "You are calling render method without specifying any render mode. "
-                f'Specify it when you make the env: gymnasium.make_vec("{ENV_ID}", '
-                'render_mode="rgb_array")'
-            )
-            return None
-        if not self._has_state:
-            return None
-        renderer = self._renderer = self._renderer or self._open_renderer()
-        return tuple(renderer.render(state) for state in self._simulation.state)
-
-    def close(self, **kwargs: object) -> None:
-        """Free the renderer, if there is one."""
-        if self._renderer is not None:
-            self._renderer.close()
-        self._renderer = None
-        super().close(**kwargs)
-
 
 def _count(name: str, value: int) -> int:
     """A whole number from 1, or ConfigError."""
     if not isinstance(value, int | np.integer) or value < 1:
         raise ConfigError(f"{name} {value!r} makes no sense; it is a whole number from 1")
     return int(value)
-
-
-def _check_render_mode(render_mode: str | None) -> None:
-    if render_mode is not None and render_mode not in get_args(VectorRenderMode):
-        raise ConfigError(
-            f"render_mode {render_mode!r} is not for a vector that moves as one; available: None, "
-            + ", ".join(repr(mode) for mode in get_args(VectorRenderMode))
-            + '; make_vec(..., vectorization_mode="sync") takes those of a single environment'
-        )

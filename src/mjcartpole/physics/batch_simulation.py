@@ -3,6 +3,7 @@
 import collections
 import statistics
 import time
+from collections.abc import Sequence
 from typing import Any, Final
 
 import mujoco
@@ -61,6 +62,7 @@ class BatchSimulation:
         check_integrator(integrator)
         self.cartpole = cartpole
         self._arguments = (cartpole, n, integrator, threads)
+        self._variants: list[CartPole] = []
         self._is_explicit, self._timestep = integrator == "gym", cartpole.timestep
         joints = len(cartpole.joints)
         # The same numbers as in the batch, side by side: what numpy is quick with.
@@ -86,11 +88,13 @@ class BatchSimulation:
                 f"many {self.cartpole.name} cannot be copied: with plugins or sleeping bodies a "
                 "model remembers more than its state; copy single environments instead"
             )
-        return self._arguments, self._batch.state.copy(), self.state.copy()
+        return self._arguments, self._variants, self._batch.state.copy(), self.state.copy()
 
     def __setstate__(self, state: tuple[Any, ...]) -> None:
-        arguments, rows, states = state
+        arguments, variants, rows, states = state
         BatchSimulation.__init__(self, *arguments)
+        if variants:
+            self.set_models(variants)
         self._batch.state[...] = rows
         self.state[...] = states
 
@@ -98,6 +102,23 @@ class BatchSimulation:
     def threads(self) -> int:
         """How many threads step at present."""
         return int(self._batch.nthread)
+
+    def set_models(self, cartpoles: Sequence[CartPole]) -> None:
+        """Let each simulation be of a model of its own, that differs by its numbers only.
+
+        Args:
+            cartpoles: One for each; what moves now stays where it is.
+        """
+        integrator = self._arguments[2]
+        made = {id(each): stepping_model(each.model, integrator) for each in cartpoles}
+        self._variants = list(cartpoles)
+        models = [made[id(each)] for each in cartpoles]
+        for batch in filter(None, (self._batch, self._other)):
+            batch.set_models(models)
+
+    def apply(self, forces: Vector) -> None:
+        """Apply forces to the carts until further ones come, N along the rail, shape (n,)."""
+        self._applied[...] = forces
 
     def set_state(self, ids: npt.NDArray[np.intp] | slice, states: Vector) -> None:
         """Put some cart-poles into states, one row each; nothing of their past remains."""
@@ -156,6 +177,7 @@ class BatchSimulation:
         # The batch keeps one row per simulation; these are columns of it, shape (n,).
         self._columns = [(qpos[:, joint], qvel[:, joint]) for joint in self.cartpole.joints]
         self._control = batch.bind("ctrl")[:, 0]
+        self._applied = batch.bind("qfrc_applied")[:, self.cartpole.slider]
 
     def _explicit_euler(self) -> None:
         """Move positions by the old velocities, velocities as MuJoCo says."""
