@@ -115,7 +115,7 @@ function centreOf(model: MjModel, data: MjData, bodies: number[]): Vector {
   return weighted.reduce((sum, each) => add(sum, each), [0, 0, 0]);
 }
 
-function upOf(gravity: Vector): Vector {
+export function upOf(gravity: Vector): Vector {
   const pulls = gravity.map(Math.abs);
   const most = Math.max(...pulls);
   const axis = pulls[2] >= most ? 2 : pulls.indexOf(most);

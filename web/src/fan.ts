@@ -5,7 +5,9 @@ import type { MjData } from "./engine";
 import { add, cross, dot, norm, row, scaled, subtract, type Vector } from "./vectors";
 
 const COLOUR = new Color(0.42, 0.52, 0.62);
-const [INSIDE, EDGE, EDGE_ANGLE, SLICE, LENGTH] = [0.14, 0.55, 0.008, 0.11, 1.06];
+const [INSIDE, EDGE_ANGLE, SLICE, LENGTH] = [0.14, 0.008, 0.11, 1.06];
+/** How opaque a limit itself is. */
+export const EDGE = 0.55;
 
 interface Wedge {
   angles: number[];
@@ -66,14 +68,18 @@ function spans(limit: number | null): [number, number, number][] {
   return [[-limit, limit, INSIDE], [-edge, -limit, EDGE], [limit, edge, EDGE]];
 }
 
+/** Return what limits are drawn in. */
+export function faint(opacity: number): MeshBasicMaterial {
+  return new MeshBasicMaterial({ color: COLOUR, opacity, transparent: true, depthWrite: false, side: DoubleSide });
+}
+
 function wedgeOf(from: number, to: number, opacity: number): Wedge {
   const count = 2 + Math.floor((to - from) / SLICE) * 2;
   const angles = Array.from({ length: count }, (_, i) => from + ((to - from) * i) / (count - 1));
   const geometry = new BufferGeometry();
   geometry.setAttribute("position", new BufferAttribute(new Float32Array(3 * (count + 1)), 3));
   geometry.setIndex(angles.slice(1).flatMap((_, i) => [0, i + 1, i + 2]));
-  const material = new MeshBasicMaterial({ color: COLOUR, opacity, transparent: true, depthWrite: false, side: DoubleSide });
-  const mesh = new Mesh(geometry, material);
+  const mesh = new Mesh(geometry, faint(opacity));
   mesh.frustumCulled = false;
   return { angles, mesh };
 }

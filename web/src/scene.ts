@@ -3,12 +3,13 @@ import {
   AmbientLight, ArrowHelper, BufferGeometry, Color, ColorManagement, DirectionalLight, Line, LineBasicMaterial,
   LinearSRGBColorSpace, type Object3D, PerspectiveCamera, Plane, Raycaster, Scene as Graph, Vector2, Vector3, type WebGLRenderer,
 } from "three";
-import { type CartPole, dataAtZero, jointsIn } from "./cartpole";
+import { type CartPole, dataAtZero, jointsIn, upOf } from "./cartpole";
 import type { TaskData } from "./data";
 import { isDark } from "./dom";
 import type { MjData, Mujoco } from "./engine";
 import { Fan } from "./fan";
 import { type Drawn, drawnGeoms } from "./geoms";
+import { postsOf } from "./posts";
 import { add, cross, row, type Vector } from "./vectors";
 
 ColorManagement.enabled = false;
@@ -54,9 +55,11 @@ export class Scene {
     this.ghosts = drawnGeoms(cartpole.model, isDark()).filter(({ moves }) => moves);
     for (const { mesh } of this.ghosts) Object.assign(mesh.material, { transparent: true, opacity: GHOST, depthWrite: false });
     this.fans = cartpole.hinges.map((_, pole) => new Fan(cartpole, pole, task.theta_limit));
+    const foot = row(this.data.xanchor, cartpole.hinges[0]);
+    const posts = postsOf(task.x_limit, foot, this.track[0], upOf(Array.from(model.opt.gravity)));
     this.rope = new Line(new BufferGeometry(), new LineBasicMaterial({ color: ACTION }));
     const parts: Object3D[] = [...this.drawn, ...this.ghosts].map(({ mesh }) => mesh);
-    this.graph.add(...parts, ...this.fans.map(({ group }) => group), this.arrow, this.rope, this.headlight, this.headlight.target);
+    this.graph.add(...parts, ...posts, ...this.fans.map(({ group }) => group), this.arrow, this.rope, this.headlight, this.headlight.target);
     this.light();
   }
 

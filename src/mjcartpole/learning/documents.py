@@ -24,7 +24,11 @@ _ADDED: Final = {
     "until": None,
     "tilings": 1,
     **dict.fromkeys(RULES),
-    **{field.name: field.default for field in dataclasses.fields(Disturbances)},
+    **{
+        # JSON has lists in place of tuples.
+        field.name: list(field.default) if type(field.default) is tuple else field.default
+        for field in dataclasses.fields(Disturbances)
+    },
 }
 """Fields that configs of version 0.1 lack, and what they stood for."""
 _SUMMARY_FIELDS: Final[Fields] = {
