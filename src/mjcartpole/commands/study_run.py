@@ -48,7 +48,8 @@ def run(file: Path, folder: Path, how: StudyOptions) -> int:
                     found = run_there(left, client, signals.stop)
                 else:
                     found = run_here(left, how.workers, signals.stop)
-                progress.study_runs(keep(found, log), len(left))
+                with contextlib.closing(keep(found, log)) as kept:
+                    progress.study_runs(kept, len(left))
             digest = write_tables(folder, planned, log.found)
             print(f"\nstudy  {folder}\ntable  {folder / RUNS}\ndigest {digest}")
             there = f" --scheduler {how.scheduler}" if how.scheduler else ""

@@ -8,7 +8,7 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import BrokenExecutor, Future
 from multiprocessing.synchronize import Event
 from typing import TypeVar
@@ -20,8 +20,8 @@ Stop = Callable[[], bool]
 """Says whether the work is to end."""
 Work = Callable[[Job, Stop], Result]
 """Does one job, or less of it once it is to stop; a function of a module, for processes."""
-Found = Iterator[tuple[Job, Future[Result]] | None]
-"""Each job with its future when that is done, and None now and then while waiting."""
+Found = Generator[tuple[Job, Future[Result]] | None, None, None]
+"""Each job with its future when that is done, and None now and then while waiting; to be closed."""
 
 
 def side_by_side(
@@ -70,8 +70,13 @@ def _in_threads(
     work: Work[Job, Result], jobs: Iterable[Job], workers: int, stop: Stop
 ) -> Found[Job, Result]:
     with concurrent.futures.ThreadPoolExecutor(workers) as pool:
-        # As many again are in line, so that no thread waits for this one.
-        yield from as_they_come(lambda job: pool.submit(work, job, stop), jobs, lambda: 2 * workers)
+        try:
+            # As many again are in line, so that no thread waits for this one.
+            yield from as_they_come(
+                lambda job: pool.submit(work, job, stop), jobs, lambda: 2 * workers
+            )
+        finally:
+            pool.shutdown(wait=False, cancel_futures=True)
 
 
 def _in_processes(

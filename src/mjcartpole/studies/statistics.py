@@ -89,7 +89,7 @@ def aggregate(scores: npt.ArrayLike, *, solved_at: float | None, seed: int = 0) 
     """
     if not (solved_at is None or math.isfinite(solved_at)):
         raise ConfigError(f"solved_at must be a finite number, not {solved_at}")
-    values = _checked(scores)
+    values = checked_scores(scores)
     return Aggregate(
         count=values.size,
         mean=float(values.mean()),
@@ -114,7 +114,7 @@ def iqm(scores: npt.ArrayLike) -> float:
     Raises:
         ConfigError: The scores are empty, not finite or of another shape.
     """
-    return float(_iqms(_checked(scores)[None])[0])
+    return float(_iqms(checked_scores(scores)[None])[0])
 
 
 def _iqms(samples: Array) -> Array:
@@ -154,8 +154,8 @@ def bootstrap_interval(
         ConfigError: The scores are empty, not finite or of another shape, a setting makes no
             sense, or the statistic is not finite.
     """
-    values = _checked(scores)
-    drawn = _resample(values, times=resamples, seed=seed)
+    values = checked_scores(scores)
+    drawn = resampled(values, times=resamples, seed=seed)
     return _percentiles((_of_each(samples, statistic) for (samples,) in drawn), confidence)
 
 
@@ -181,7 +181,7 @@ def bootstrap_band(
     Raises:
         ConfigError: The curves are empty or not finite.
     """
-    values = np.atleast_2d(_checked(curves, "curves"))
+    values = np.atleast_2d(checked_scores(curves, "curves"))
     n = len(values)
     cut = n // 4 if average == "iqm" else 0
     drawn = np.random.default_rng(seed).multinomial(n, np.full(n, 1 / n), size=resamples)
@@ -246,7 +246,7 @@ def improvement_interval(
     Raises:
         ConfigError: See both.
     """
-    drawn = _resample(*_checked_pair(x, y), times=resamples, seed=seed)
+    drawn = resampled(*_checked_pair(x, y), times=resamples, seed=seed)
     draws = ([_improvement(*pair) for pair in zip(*pairs, strict=True)] for pairs in drawn)
     return _percentiles(draws, confidence)
 
@@ -264,7 +264,7 @@ def _improvement(x: Array, y: Array) -> float:
     return points / (2 * x.size * len(y))
 
 
-def _resample(*groups: Array, times: int, seed: int) -> Iterator[tuple[Array, ...]]:
+def resampled(*groups: Array, times: int, seed: int) -> Iterator[tuple[Array, ...]]:
     """Yield each group drawn anew within its tasks, `times` over: along a first axis, in blocks."""
     if times < 1:
         raise ConfigError(f"resamples must be a whole number from 1 up, not {times}")
@@ -294,7 +294,7 @@ def _percentiles(draws: Iterator[npt.ArrayLike], confidence: float) -> Interval:
     return Interval(float(low), float(high))
 
 
-def _checked(scores: npt.ArrayLike, name: str = "scores") -> Array:
+def checked_scores(scores: npt.ArrayLike, name: str = "scores") -> Array:
     """Return scores as an array.
 
     Raises:
@@ -324,7 +324,7 @@ def _checked_pair(x: npt.ArrayLike, y: npt.ArrayLike) -> tuple[Array, Array]:
     Raises:
         ConfigError: One is not usable, or they have not the same tasks.
     """
-    pair = _checked(x, "x"), _checked(y, "y")
+    pair = checked_scores(x, "x"), checked_scores(y, "y")
     if pair[0].shape[1:] != pair[1].shape[1:]:
         raise ConfigError(
             "x and y need the same tasks, one column each; "

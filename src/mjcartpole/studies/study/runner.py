@@ -1,6 +1,7 @@
 """A study at work: what is not done yet is done, and each run is kept as soon as it has come."""
 
-from collections.abc import Iterator, Sequence
+import contextlib
+from collections.abc import Generator, Sequence
 from concurrent.futures import BrokenExecutor, CancelledError, Future
 from typing import Any
 
@@ -44,7 +45,7 @@ def _do(run: tuple[str, SeedJob], stop: Stop) -> Record | None:
     return do_run(*run, stop)
 
 
-def keep(found: Found[Any, Record | None], log: RecordLog) -> Iterator[Record | None]:
+def keep(found: Found[Any, Record | None], log: RecordLog) -> Generator[Record | None, None, None]:
     """Write each result into the log as it comes.
 
     Yields:
@@ -53,7 +54,7 @@ def keep(found: Found[Any, Record | None], log: RecordLog) -> Iterator[Record | 
     Raises:
         FileError: The log cannot be written.
     """
-    with log.writing() as add:
+    with log.writing() as add, contextlib.closing(found):
         for one in found:
             record = None if one is None else _result_of(one[1])
             if record is not None:

@@ -1,0 +1,39 @@
+"""What a study says: written, and its sentences printed."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from mjcartpole.commands.printing import counted
+from mjcartpole.files import write_whole
+from mjcartpole.learning.folders import locked_folder
+from mjcartpole.media import plots
+from mjcartpole.studies.study.folder import REPORTS
+from mjcartpole.studies.study.report import sections
+from mjcartpole.studies.study.report_plot import ReportPlot
+from mjcartpole.studies.study.report_text import latex, markdown
+from mjcartpole.studies.study.results import read_results
+
+
+def report(folder: Path, baseline: Sequence[str]) -> int:
+    """Write a report of a study into its folder. Returns the exit code.
+
+    Raises:
+        RunError: The folder is no study, or is damaged.
+        ConfigError: The base line is no level.
+        FileError: The folder cannot be written.
+    """
+    results = read_results(folder)
+    against = results.baseline(baseline)
+    found, drawn = sections(results, against), plots.is_installed()
+    in_markdown, in_latex, plot = (folder / name for name in REPORTS)
+    name, runs = folder.resolve().name, counted(len(results.seeds), "run")
+    failed = f"; {results.failed:,} more failed, and are left out" if results.failed else ""
+    head = f"{runs}{failed}. Intervals are 95 % bootstrap intervals; IQM is the interquartile mean."
+    with locked_folder(folder):
+        write_whole(in_markdown, markdown(name, head, found, plot.name if drawn else ""))
+        write_whole(in_latex, latex(name, found))
+        if drawn:
+            plots.write_plot(ReportPlot(results).figure(), plot)
+    print(*(section.sentence for section in found), sep="\n")
+    print(f"\nreport {in_markdown}\nlatex  {in_latex}" + (f"\nplot   {plot}" if drawn else ""))
+    return 0

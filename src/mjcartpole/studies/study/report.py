@@ -1,0 +1,284 @@
+"""What a study says: each factor and pair of factors, the best points, the worst seeds.
+
+Averages are interquartile means with bootstrap intervals, after Agarwal et al. 2021
+(arXiv:2108.13264). On a full grid the points of a level are its tasks, and seeds its runs;
+elsewhere all runs of a level are pooled.
+"""
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+import numpy.typing as npt
+
+from mjcartpole.studies.profiles import shares_above, variance_shares
+from mjcartpole.studies.statistics import (
+    Array,
+    Interval,
+    bootstrap_interval,
+    improvement_interval,
+    iqm,
+    probability_of_improvement,
+)
+from mjcartpole.studies.study.measures import MEASURES
+from mjcartpole.studies.study.results import Levels, Results
+
+RESAMPLES: Final = 2_000
+_MOST_DRAWN: Final = 4_000_000
+"""Scores that are drawn for an interval: a second's work."""
+_LEAST_RESAMPLES: Final = 200
+BEST: Final = 10
+WORST: Final = 5
+MOST_CELLS: Final = 64
+"""Of a pair of factors that has a table."""
+THRESHOLDS: Final = 5
+
+Labels = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of a report, as text.
+
+    Attributes:
+        title: What it shows.
+        columns: Their names.
+        rows: A cell for each column.
+        note: What is to be said of it.
+    """
+
+    title: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Section:
+    """What a study says of one measure.
+
+    Attributes:
+        measure: Its name.
+        sentence: All of it in one.
+        tables: In order.
+    """
+
+    measure: str
+    sentence: str
+    tables: tuple[Table, ...]
+
+
+def sections(results: Results, baseline: dict[str, str]) -> list[Section]:
+    """Return what a study says of each measure.
+
+    Args:
+        results: What it has come to.
+        baseline: The level of each factor that others are held against.
+    """
+    return [_section(results, measure, baseline) for measure in results.study.measure]
+
+
+def _section(results: Results, measure: str, baseline: dict[str, str]) -> Section:
+    of = OfMeasure(results, measure)
+    best, shares = of.points(), of.shares()
+    tables = [_best(of, best)]
+    for levels in results.levels:
+        tables += [_factor(of, levels, baseline[levels.name]), _profile(of, levels)]
+    for one, other in itertools.combinations(results.levels, 2):
+        if len(one.names) * len(other.names) <= MOST_CELLS:
+            tables.append(_pair(of, one, other))
+    tables += [_sensitivity(of, shares), *_worst(of)]
+    return Section(measure, _sentence(of, best, shares), tuple(tables))
+
+
+@dataclass(frozen=True, eq=False)
+class OfMeasure:
+    """Results of one measure, as scores of which more are better."""
+
+    results: Results
+    measure: str
+
+    @property
+    def scores(self) -> Array:
+        """Each run's figure."""
+        return np.asarray(self.results.scores[self.measure])
+
+    @property
+    def sign(self) -> int:
+        """1 where more is better, else -1."""
+        return 1 if MEASURES[self.measure].more_is_better else -1
+
+    def of_level(self, levels: Levels, level: int) -> Array:
+        """Return the scores of a level: a column for each point on a full grid, else pooled."""
+        chosen = levels.labels == level
+        scores: Array = self.scores[chosen]
+        points = self.results.points[chosen]
+        numbers, counts = np.unique(points, return_counts=True)
+        if self.results.study.design != "grid" or (counts != counts[0]).any():
+            return scores
+        order = np.argsort(points, kind="stable")
+        by_point: Array = scores[order].reshape(len(numbers), -1).T
+        return by_point
+
+    def points(self) -> list[tuple[float, Interval, Array, int]]:
+        """Return IQM, interval, scores and a run of each point, the best first."""
+        found = []
+        for point in np.unique(self.results.points):
+            runs = np.flatnonzero(self.results.points == point)
+            found.append((iqm(self.scores[runs]), runs))
+        found.sort(key=lambda each: -self.sign * each[0])
+        return [
+            (middle, interval_of(self.scores[runs]), self.scores[runs], int(runs[0]))
+            for middle, runs in found[:BEST]
+        ]
+
+    def shares(self) -> dict[tuple[str, ...], float]:
+        """Return the share of variance of each factor and pair."""
+        return variance_shares(
+            self.scores, {each.name: each.labels for each in self.results.levels}
+        )
+
+    def by_chance(self, names: Sequence[str]) -> float:
+        """Return which share of variance a factor, or a pair, explains that has no effect."""
+        free = [len(each.names) - 1 for each in self.results.levels if each.name in names]
+        return math.prod(free) / max(1, self.scores.size - 1)
+
+
+def interval_of(scores: Array) -> Interval:
+    """Return the 95 % interval of the interquartile mean of scores; of equal ones no width."""
+    if (scores == scores.flat[0]).all():
+        return Interval(float(scores.flat[0]), float(scores.flat[0]))
+    return bootstrap_interval(scores, resamples=_resamples(scores.size))
+
+
+def _resamples(size: int) -> int:
+    return max(_LEAST_RESAMPLES, min(RESAMPLES, _MOST_DRAWN // size))
+
+
+def _best(of: OfMeasure, best: Sequence[tuple[float, Interval, Array, int]]) -> Table:
+    rows = [
+        (
+            of.results.words[run],
+            str(len(scores)),
+            *_average(middle, interval),
+            _worse(of, scores),
+        )
+        for middle, interval, scores, run in best
+    ]
+    note = f"The best {len(rows)} of {len(np.unique(of.results.points))} points."
+    return Table("points", ("point", "runs", "IQM", "95 %", "worst"), tuple(rows), note)
+
+
+def _factor(of: OfMeasure, levels: Levels, base: str) -> Table:
+    """Return the averages of a factor's levels, and how likely each is better than the base."""
+    against = of.of_level(levels, levels.names.index(base))
+    rows = []
+    for place, name in enumerate(levels.names):
+        scores = of.of_level(levels, place)
+        better = ("", "") if name == base else _improvement(of.sign * scores, of.sign * against)
+        average = _average(iqm(scores), interval_of(scores))
+        rows.append((name, str(scores.size), *average, _worse(of, scores), *better))
+    columns = (levels.name, "runs", "IQM", "95 %", "worst", f"P(better than {base})", "95 % of P")
+    return Table(levels.name, columns, tuple(rows), _unsolved(of))
+
+
+def _improvement(x: Array, y: Array) -> tuple[str, str]:
+    if x.shape[1:] != y.shape[1:]:
+        x, y = x.ravel(), y.ravel()
+    times = max(_LEAST_RESAMPLES, min(RESAMPLES, _MOST_DRAWN // (100 * (x.size + y.size))))
+    low, high = improvement_interval(x, y, resamples=times)
+    return f"{probability_of_improvement(x, y):.2f}", f"{low:.2f} to {high:.2f}"
+
+
+def _profile(of: OfMeasure, levels: Levels) -> Table:
+    """Return which share of a level's runs is better than each of some values."""
+    ends = float(of.scores.min()), float(of.scores.max())
+    at = np.linspace(*ends, THRESHOLDS + 2)[1:-1]
+    rows = []
+    for place, name in enumerate(levels.names):
+        scores = of.sign * of.of_level(levels, place)
+        shares = shares_above(scores, of.sign * at)
+        rows.append((name, *(f"{share:.0%}" for share in shares)))
+    beyond = "more" if of.sign > 0 else "less"
+    columns = (levels.name, *(f"{beyond} than {value:.4g}" for value in at))
+    return Table(f"{levels.name}: performance profile", columns, tuple(rows))
+
+
+def _pair(of: OfMeasure, one: Levels, other: Levels) -> Table:
+    rows = []
+    for place, name in enumerate(one.names):
+        cells = []
+        for column in range(len(other.names)):
+            scores = of.scores[(one.labels == place) & (other.labels == column)]
+            low, high = interval_of(scores) if scores.size else (0.0, 0.0)
+            cells.append(f"{iqm(scores):.4g} ({low:.4g} to {high:.4g})" if scores.size else "")
+        rows.append((name, *cells))
+    columns = (f"{one.name} \\ {other.name}", *other.names)
+    return Table(f"{one.name} and {other.name}: IQM", columns, tuple(rows))
+
+
+def _sensitivity(of: OfMeasure, shares: dict[tuple[str, ...], float]) -> Table:
+    rows = [
+        (" and ".join(names), f"{share:.1%}", f"{of.by_chance(names):.1%}")
+        for names, share in sorted(shares.items(), key=lambda item: -item[1])
+    ]
+    rest = 1 - sum(shares.values()) if of.scores.std() > 0 else 0.0
+    rows.append(("seeds and the rest", f"{max(0.0, rest):.1%}", ""))
+    note = (
+        "A pair's share is what both explain together beyond each; by chance: of no effect at all."
+    )
+    return Table("sensitivity", ("factor", "share of variance", "by chance"), tuple(rows), note)
+
+
+def _worst(of: OfMeasure) -> list[Table]:
+    """Return the worst runs, and the worst seeds over all points."""
+    order = np.argsort(of.sign * of.scores, kind="stable")[:WORST]
+    seeds = np.array(of.results.seeds, dtype=object)
+    rows = [(str(seeds[run]), of.results.words[run], f"{of.scores[run]:.5g}") for run in order]
+    means = {seed: float(of.scores[seeds == seed].mean()) for seed in dict.fromkeys(seeds)}
+    ranked = sorted(means, key=lambda seed: of.sign * means[seed])[:WORST]
+    return [
+        Table("worst runs", ("seed", "point", of.measure), tuple(rows)),
+        Table(
+            "worst seeds",
+            ("seed", f"mean {of.measure} over all points"),
+            tuple((str(seed), f"{means[seed]:.5g}") for seed in ranked),
+        ),
+    ]
+
+
+def _average(middle: float, interval: Interval) -> tuple[str, str]:
+    return f"{middle:.5g}", f"{interval.low:.5g} to {interval.high:.5g}"
+
+
+def _worse(of: OfMeasure, scores: Array) -> str:
+    return f"{of.sign * (of.sign * scores).min():.5g}"
+
+
+def _unsolved(of: OfMeasure) -> str:
+    solved = of.results.solved[of.measure]
+    if solved.all():
+        return ""
+    return (
+        f"{np.count_nonzero(~solved)} of {solved.size} runs never came to it, and count as all "
+        "that they spent: a lower bound."
+    )
+
+
+def _sentence(
+    of: OfMeasure,
+    best: Sequence[tuple[float, Interval, Array, int]],
+    shares: dict[tuple[str, ...], float],
+) -> str:
+    middle, interval, scores, run = best[0]
+    said = (
+        f"Best by {of.measure} is {of.results.words[run]}: IQM {middle:.5g} "
+        f"(95 % {interval.low:.5g} to {interval.high:.5g}, {len(scores)} runs)"
+    )
+    names, share = max(shares.items(), key=lambda item: item[1])
+    if share <= of.by_chance(names):
+        return f"{said}; no factor explains more of the variance than chance would."
+    return f"{said}; {' with '.join(names)} explains most: {share:.0%} of the variance."
