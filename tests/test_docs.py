@@ -121,8 +121,8 @@ PICTURES = {
 
 PLAIN = {
     "models/                 MJCF files, hand-written and commented; they ship inside the wheel",
-    "errors ← cores ← task ← integrator ← leftovers ← files ← versions ← physics ← media ← envs"
-    " ← learning ← studies ← page ← commands ← cli",
+    "errors ← cores ← rewards ← rules ← task ← rule_changes ← disturbances ← integrator ← leftovers"
+    " ← files ← versions ← physics ← media ← envs ← learning ← studies ← page ← commands ← cli",
     "Q(s, a) ← Q(s, a) + α (G − Q(s, a))",  # noqa: RUF001 - a formula
     "G_t = r_t + γ ((1 − λ) max Q(s_t+1, ·) + λ G_t+1)",  # noqa: RUF001 - a formula
 }

@@ -216,3 +216,37 @@ def test_a_state_that_is_set_leaves_nothing_of_the_motion_before() -> None:
     env.step(1)
     env.state = (0.0, 0.0, 0.0, 0.0)
     assert env.step(0)[0].tolist() == [0.0, 0.0, 0.0, 0.0], "no push yet"
+
+
+@pytest.mark.parametrize("given", EACH, ids=str)
+def test_dm_control_is_disturbed_as_gymnasium_is(given: dict[str, Any]) -> None:
+    dm = pytest.importorskip("mjcartpole.envs.dm", exc_type=ImportError)
+    ours = gymnasium.make(ID, integrator="mujoco", **given)
+    theirs = dm.load(seed=3, discrete=True, **given)
+    theirs.observation_spec()
+    rng, seed = np.random.default_rng(1), 3
+    for _ in range(3):
+        (expected, info), step = ours.reset(seed=seed), theirs.reset()
+        seed = None
+        assert theirs.task.disturber.context == info.get("context", {})
+        over = False
+        while not over:
+            theirs.observation_spec()
+            found = step.observation
+            state = np.ravel(np.column_stack([found["position"], found["velocity"]]))
+            besides = [*found.get("actions", ()), *found.get("context", ())]
+            assert np.float32([*state, *besides]).tobytes() == expected.tobytes()
+            if step.last():
+                break
+            action = int(rng.random() < 0.5)
+            expected, _, over, _, _ = ours.step(action)
+            step = theirs.step(action)
+        assert step.last()
+
+
+def test_a_seed_of_dm_control_disturbs_alike_again() -> None:
+    dm = pytest.importorskip("mjcartpole.envs.dm", exc_type=ImportError)
+    env = dm.load(seed=3, noise=0.1)
+    first = env.reset().observation["position"]
+    env.task.random.seed(3)
+    assert env.reset().observation["position"].tolist() == first.tolist()

@@ -149,6 +149,11 @@ class Disturber:
         return self._contexts is not None
 
     @property
+    def is_drawing(self) -> bool:
+        """Whether a first episode has begun."""
+        return self._chance is not None
+
+    @property
     def _rng(self) -> np.random.Generator:
         if self._chance is None:
             raise ResetNeededError("Call reset before using step method.")

@@ -57,7 +57,7 @@ class Disturbers:
             member = self.members[index]
             context = member.draw(np_random)
             if self.vary:
-                self.cartpoles[index] = _in_step(variant(self._base, context), self._base)
+                self.cartpoles[index] = in_step(variant(self._base, context), self._base)
                 member.fit(self.cartpoles[index])
             member.forget()
         if self.vary:
@@ -99,10 +99,15 @@ class Disturbers:
         return [(index, {"context": dict(self.members[index].context)}) for index in who]
 
 
-def _in_step(cartpole: CartPole, base: CartPole) -> CartPole:
+def in_step(cartpole: CartPole, base: CartPole) -> CartPole:
+    """Return a variant that steps as its base does.
+
+    Raises:
+        ConfigError: It does not.
+    """
     if (cartpole.timestep, cartpole.substeps) != (base.timestep, base.substeps):
         raise ConfigError(
-            "many environments move by one timestep; where it varies, take single environments, or "
-            'make_vec(..., vectorization_mode="sync")'
+            "these environments keep one timestep; where it is to vary, take those of "
+            'gymnasium.make, or make_vec(..., vectorization_mode="sync")'
         )
     return cartpole

@@ -1,23 +1,28 @@
 """CartPole-v1 with MuJoCo underneath, as a `dm_env.Environment` built on dm_control.
 
-Nothing else of this package imports dm_control, which takes a second or two.
+Nothing but this file and `dm_physics.py` imports dm_control, which takes a second or two.
 """
 
 import collections
-import copy
+import functools
 import math
 import operator
-import warnings
-from typing import Any, Final, Unpack, get_args
+from collections.abc import Mapping
+from typing import Any, Final, cast, get_args
 
 import numpy as np
 import numpy.typing as npt
 
+from mjcartpole.disturbances.disturbances import Disturbances
+from mjcartpole.envs.disturber import Disturber
+from mjcartpole.envs.disturbers import in_step
+from mjcartpole.envs.dm_physics import HIGHLIGHT, Physics, StartingStates, control, specs
 from mjcartpole.envs.observations import Observation, with_cosines
 from mjcartpole.errors import ConfigError, check_known
 from mjcartpole.physics.bodies import starting_state
 from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.load import Edits, ModelLike, load_model
+from mjcartpole.physics.variants import variant
 from mjcartpole.rules import Changes
 from mjcartpole.task import (
     CARTPOLE_V1,
@@ -25,113 +30,22 @@ from mjcartpole.task import (
     N_ACTIONS,
     TASKS,
     Task,
+    control_of,
     worst_pole,
 )
-
-try:
-    with warnings.catch_warnings():
-        # It looks for a window system on import, and warns where there is none.
-        warnings.simplefilter("ignore")
-        from dm_control import mujoco
-        from dm_control.mujoco import wrapper
-        from dm_control.rl import control
-        from dm_env import specs  # type: ignore[import-untyped]
-
-        # Its list of MuJoCo's fields may be another version's, which shows at the first model.
-        mujoco.Physics.from_xml_string("<mujoco/>")
-except Exception as error:
-    _why = " ".join(f"{type(error).__name__}: {error}".split())
-    raise ImportError(
-        f"mjcartpole.envs.dm needs dm_control, which does not load: {_why}; it comes along "
-        "on Python 3.11 and 3.12, and fits MuJoCo below 4"
-    ) from error
 
 BALANCE: Final = "balance"
 """What dm_control's suite calls the task that is CartPole-v1."""
 
-HIGHLIGHT: Final = (0.0, 0.5, 0.3)
-"""What poles look like at reward 1, where rewards are to be seen: the suite's own colour."""
-
-
-class StartingStates(np.random.RandomState):
-    """Draws starting states: what dm_control calls a task's `random`.
-
-    It has the methods of a `RandomState`, and the draws of gymnasium's generators: one seed gives
-    the same starting states in both worlds.
-    """
-
-    def __init__(self, seed: int | np.random.PCG64 | None = None) -> None:
-        """Seed it; None draws a seed, and a bit generator is taken as it stands."""
-        super().__init__(seed if isinstance(seed, np.random.PCG64) else np.random.PCG64(seed))
-
-    def seed(self, seed: int | None = None) -> None:  # type: ignore[override]
-        """Start anew from a seed; None draws one."""
-        self._bit_generator.state = np.random.PCG64(seed).state
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        """A copy keeps the class, and with it the way of seeding."""
-        return type(self), (self._bit_generator,)
-
-
-class Physics(mujoco.Physics):  # type: ignore[misc]
-    """dm_control's physics, with readings that have names."""
-
-    cartpole: CartPole
-
-    @classmethod
-    def of(cls, cartpole: CartPole) -> "Physics":
-        """Physics of a cart-pole; whatever is changed in its model stays there."""
-        physics: Physics = cls.from_model(wrapper.MjModel(copy.copy(cartpole.model)))
-        physics.cartpole = cartpole
-        return physics
-
-    def copy(self, share_model: bool = False) -> "Physics":
-        """A copy that moves on its own; see dm_control."""
-        copied: Physics = super().copy(share_model)
-        copied.cartpole = self.cartpole
-        return copied
-
-    def __getstate__(self) -> tuple[Any, CartPole]:
-        return super().__getstate__(), self.cartpole
-
-    def __setstate__(self, state: tuple[Any, CartPole]) -> None:
-        data, self.cartpole = state
-        super().__setstate__(data)
-
-    def after_reset(self) -> None:
-        """Bring all that follows from the state up to date; an episode has no past."""
-        super().after_reset()
-        # The solver would begin its first step from here, and end at other bits.
-        self.data.qacc_warmstart[:] = 0
-
-    @property
-    def state(self) -> npt.NDArray[np.float64]:
-        """The state `(x, x_dot, theta, theta_dot, …)`, a copy; m, m/s, rad, rad/s."""
-        joints = list(self.cartpole.joints)
-        return np.column_stack([self.data.qpos[joints], self.data.qvel[joints]]).ravel()
-
-    def set_state(self, state: npt.NDArray[np.float64]) -> None:
-        """Put the cart-pole into a state; inside `reset_context`."""
-        joints = list(self.cartpole.joints)
-        self.data.qpos[joints], self.data.qvel[joints] = state[0::2], state[1::2]
-
-    def cart_position(self) -> float:
-        """Where the cart is, m."""
-        return float(self.data.qpos[self.cartpole.slider])
-
-    def pole_angles(self) -> npt.NDArray[np.float64]:
-        """How far each pole leans, rad, shape (poles,)."""
-        angles: npt.NDArray[np.float64] = self.data.qpos[list(self.cartpole.hinges)]
-        return angles
-
-    def show(self, reward: float) -> None:
-        """Colour the poles by a reward from 0, their own colour, to 1, `HIGHLIGHT`."""
-        own, weight = self.cartpole.model.geom_rgba, min(max(reward, 0.0), 1.0) ** 4
-        poles = self.cartpole.model.dof_bodyid[list(self.cartpole.hinges)]
-        geoms = np.isin(self.cartpole.model.geom_bodyid, poles)
-        self.model.geom_rgba[geoms, :3] = (
-            weight * np.array(HIGHLIGHT) + (1 - weight) * own[geoms, :3]
-        )
+__all__ = [
+    "BALANCE",
+    "HIGHLIGHT",
+    "Balance",
+    "DisturbedBalance",
+    "Physics",
+    "StartingStates",
+    "load",
+]
 
 
 class Balance(control.Task):  # type: ignore[misc]
@@ -211,8 +125,8 @@ class Balance(control.Task):  # type: ignore[misc]
         size = 2 * len(physics.cartpole.joints)
         drawn = self.random.uniform(low=low, high=high, size=size)
         physics.set_state(drawn + self._middle)
-        self._show_reward(physics)
         self.steps = 0
+        self._show_reward(physics)
 
     def action_spec(self, physics: Physics) -> specs.BoundedArray:
         """What actions look like."""
@@ -227,7 +141,11 @@ class Balance(control.Task):  # type: ignore[misc]
         Raises:
             ConfigError: A discrete action is neither 0 nor 1, or another is no finite number.
         """
-        physics.set_control([self._control(np.asarray(action))])
+        self.push(self._control(np.asarray(action)), physics)
+
+    def push(self, control: float, physics: Physics) -> None:
+        """Let the motor have a control."""
+        physics.set_control([control])
 
     def after_step(self, physics: Physics) -> None:
         """Count, and show the reward where that is wanted."""
@@ -238,12 +156,16 @@ class Balance(control.Task):  # type: ignore[misc]
         self, physics: Physics
     ) -> "collections.OrderedDict[str, npt.NDArray[np.float64]]":
         """The state, positions and velocities apart."""
+        state = self.seen(physics)
         if self._is_trig:
-            both = with_cosines(physics.state)
+            both = with_cosines(state)
             position = np.delete(both, np.s_[1::3])
             return collections.OrderedDict(position=position, velocity=both[1::3])
-        state = self._rules.seen(physics.state)
         return collections.OrderedDict(position=state[0::2], velocity=state[1::2])
+
+    def seen(self, physics: Physics) -> npt.NDArray[np.float64]:
+        """What is seen of the state."""
+        return self._rules.seen(physics.state)
 
     def get_reward(self, physics: Physics) -> float:
         """Return the task's reward: of CartPole-v1, 1 for every step."""
@@ -273,6 +195,67 @@ class Balance(control.Task):  # type: ignore[misc]
         return min(max(float(action.item()), low), high)
 
 
+class DisturbedBalance(Balance):
+    """`Balance` with disturbances, which are those of the gymnasium environment, bit for bit.
+
+    - What lasts from step to step is seen besides: `actions`, the last ones, and `context`, what
+      varies, where that is asked for.
+    - What an episode has drawn is in `task.disturber.context`.
+
+    Attributes:
+        disturber: Adds them.
+    """
+
+    def __init__(self, cartpole: CartPole, disturbances: Disturbances, **settings: Any) -> None:  # noqa: ANN401
+        super().__init__(cartpole, **settings)
+        self.disturber = Disturber(disturbances, cartpole, self._rules)
+        self._base, self._own_controls = cartpole, cartpole.controls
+        self._seen: tuple[int, npt.NDArray[np.float64]] | None = None
+
+    def initialize_episode(self, physics: Physics) -> None:
+        """Draw a model and a starting state."""
+        random = self.random
+        seeded = random.seeded if isinstance(random, StartingStates) else random
+        context = self.disturber.draw(seeded)  # type: ignore[arg-type]
+        if self.disturber.varies:
+            cartpole = in_step(variant(self._base, context), self._base)
+            physics.become(cartpole)
+            self.disturber.fit(cartpole)
+            self._own_controls = cartpole.controls
+        self.disturber.forget()
+        self._seen = None
+        super().initialize_episode(physics)
+
+    def push(self, control: float, physics: Physics) -> None:
+        """Let the motor make what it does of a control, and apply the force besides."""
+        left, right = self._controls
+        made, force = self.disturber.actuate((2.0 * control - left - right) / (right - left))
+        physics.data.qfrc_applied[physics.cartpole.slider] = force
+        super().push(control_of(made, self._own_controls), physics)
+
+    def seen(self, physics: Physics) -> npt.NDArray[np.float64]:
+        """What is seen of the state: the same however often it is looked at."""
+        state = super().seen(physics)
+        if not self.disturber.is_drawing:
+            return state
+        if self._seen is None or self._seen[0] != self.steps:
+            self._seen = self.steps, self.disturber.sense(state)
+        return self._seen[1]
+
+    def get_observation(
+        self, physics: Physics
+    ) -> "collections.OrderedDict[str, npt.NDArray[np.float64]]":
+        """The state, positions and velocities apart, and what is seen besides."""
+        observation = super().get_observation(physics)
+        besides, actions = self.disturber.seen_besides, self.disturber.effects.actions
+        if actions:
+            observation["actions"] = np.array(besides[:actions])
+        if self.disturber.disturbances.observe_context:
+            n = len(self.disturber.disturbances.ranges)
+            observation["context"] = np.array(besides[actions:] or [0.0] * n)
+        return observation
+
+
 def load(
     task_name: str = "balance",
     *,
@@ -285,7 +268,8 @@ def load(
     environment_kwargs: dict[str, Any] | None = None,
     visualize_reward: bool = False,
     observation: Observation = "state",
-    **rules: Unpack[Changes],
+    disturbances: Disturbances | Mapping[str, Any] | None = None,
+    **more: Any,  # noqa: ANN401 - rules and disturbances
 ) -> control.Environment:
     """Make CartPole-v1 as a dm_control environment; see `Balance` for its rules.
 
@@ -310,8 +294,10 @@ def load(
         environment_kwargs: More for dm_control's `Environment`, such as `flat_observation`.
         visualize_reward: Colour the poles by the reward, in pictures.
         observation: `trig` for cosine and sine in place of each angle.
-        rules: Those that are other than the task's: `x_limit`, `theta_limit`, `start_low`,
-            `start_high`, `start_angle`, `reward`; see `mjcartpole.Task`.
+        disturbances: What reality adds; see `DisturbedBalance`.
+        more: Each disturbance by itself; and rules that are other than the task's: `x_limit`,
+            `theta_limit`, `start_low`, `start_high`, `start_angle`, `reward`; see
+            `mjcartpole.Task`.
 
     Raises:
         ConfigError: There is no such task, or a setting makes no sense.
@@ -319,7 +305,8 @@ def load(
     """
     known = {BALANCE: CARTPOLE_V1, **TASKS}
     check_known("task", task_name, known)
-    task = known[task_name].with_changes(**rules)
+    added = Disturbances.taken_from(more, disturbances)
+    task = known[task_name].with_changes(**cast(Changes, more))
     if time_limit is None:
         time_limit = task.time_limit * CONTROL_STEP
     if not time_limit > 0:
@@ -330,7 +317,8 @@ def load(
     limit = time_limit
     if not math.isinf(time_limit):
         limit = max(1, round(time_limit / cartpole.control_step))
-    balance = Balance(
+    kind = functools.partial(DisturbedBalance, disturbances=added) if added.are_some else Balance
+    balance = kind(
         cartpole,
         random=seed,
         limit=limit,

@@ -2,6 +2,9 @@
 
 from typing import Final
 
+import mujoco
+import numpy as np
+
 from mjcartpole.disturbances.contexts import Context, Contexts
 from mjcartpole.disturbances.disturbances import Disturbances
 from mjcartpole.errors import ConfigError, ModelError
@@ -45,3 +48,25 @@ def contexts_of(base: CartPole, disturbances: Disturbances) -> Contexts:
             except (ConfigError, ModelError) as error:
                 raise ConfigError(f"vary {each.text!r} cannot be: {error}") from error
     return Contexts(ranges, disturbances.pool or 0, disturbances.widen)
+
+
+def write_numbers(source: mujoco.MjModel, target: mujoco.MjModel) -> None:
+    """Make a compiled model another one that differs by its numbers only, in place.
+
+    Raises:
+        ConfigError: They differ by more.
+    """
+    for part in ("", "opt", "stat", "vis"):
+        here, there = (getattr(each, part) if part else each for each in (source, target))
+        for name in dir(here):
+            value = getattr(here, name)
+            if name.startswith("_") or callable(value):
+                continue
+            if isinstance(value, np.ndarray):
+                array = getattr(there, name)
+                if array.shape != value.shape:
+                    raise ConfigError(f"{name} is of another shape in a variant of this model")
+                if array.flags.writeable:
+                    array[...] = value
+            elif part and isinstance(value, int | float):
+                setattr(there, name, value)
