@@ -57,6 +57,8 @@ NOT_HERE = {
     ".venv/bin/pip install -e '.[dev]'": "it loads packages from an index",
     "pip install 'mjcartpole[tensorboard]'": "it loads packages from an index",
     "pip install 'mjcartpole[plot]'": "it loads packages from an index",
+    "pip install 'mjcartpole[dask]'": "it loads packages from an index",
+    "mjcartpole study docs/study.toml --scheduler tcp://127.0.0.1:8786": "it needs a scheduler",
 }
 """Commands that are not run, and why."""
 
@@ -124,6 +126,9 @@ PLAIN = {
     "errors ← cores ← rewards ← rules ← task ← rule_changes ← disturbances ← integrator ← leftovers"
     " ← files ← versions ← physics ← media ← envs ← learning ← studies ← page ← commands ← cli",
     "Q(s, a) ← Q(s, a) + α (G − Q(s, a))",  # noqa: RUF001 - a formula
+    "[study]",
+    "dask scheduler",
+    "from dask_jobqueue import SLURMCluster",
     "G_t = r_t + γ ((1 − λ) max Q(s_t+1, ·) + λ G_t+1)",  # noqa: RUF001 - a formula
 }
 """First lines of blocks that are neither commands nor Python nor printed."""

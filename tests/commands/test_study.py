@@ -6,7 +6,9 @@ import os
 import signal
 import subprocess
 import sys
+import textwrap
 import time
+from pathlib import Path
 
 import pytest
 
@@ -162,6 +164,20 @@ def test_a_run_that_fails_is_told_and_takes_no_other_down(tmp_path, monkeypatch,
     assert bad["greedy_mean"] == "" and "diverged" in bad["error"]
     code, out, _ = call(["study", "a.toml", "--resume"], capsys)
     assert "2 runs done before, 0 left" in out
+
+
+def test_the_example_of_the_docs(tmp_path, monkeypatch, capsys):
+    docs = Path(__file__).parents[2] / "docs"
+    text = (docs / "study.toml").read_text()
+    assert textwrap.indent(text, "    ", lambda line: line.strip()) in (
+        docs / "studies.md"
+    ).read_text(encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    Path("study.toml").write_text(text.replace("= 10", "= 2").replace("= 300", "= 5"))
+    code, out, err = call(["study", "study.toml"], capsys)
+    assert (code, err) == (0, "") and "8 points (grid: alpha, td_lambda, pole.length)" in out
+    code, out, err = call(["study", "report", "studies/study"], capsys)
+    assert (code, err) == (0, "") and out.count("Best by ") == 2
 
 
 @pytest.mark.slow

@@ -20,7 +20,7 @@ from mjcartpole.studies.study.settings import (
 
 
 def test_the_examples():
-    assert doctest.testmod(settings).attempted == 2
+    assert doctest.testmod(settings).attempted == 3
 
 
 def test_every_field_of_every_method_is_a_setting_but_for_the_seed():

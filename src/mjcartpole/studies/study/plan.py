@@ -132,7 +132,7 @@ def _runs(
 
 def _key(config: TrainConfig, digest: str) -> str:
     """Return a hash of all that decides a training, whatever its model is called here."""
-    values = config.values() | ({"model": digest, "set": ()} if digest else {})
+    values = config.stored() | ({"model": digest, "set": ()} if digest else {})
     text = json.dumps(values, sort_keys=True)
     return checksum(text)[:_KEY_DIGITS]
 

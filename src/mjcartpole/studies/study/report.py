@@ -129,7 +129,10 @@ class OfMeasure:
         for point in np.unique(self.results.points):
             runs = np.flatnonzero(self.results.points == point)
             found.append((iqm(self.scores[runs]), runs))
-        found.sort(key=lambda each: -self.sign * each[0])
+        # Points of equal averages are told apart by what these leave out.
+        found.sort(
+            key=lambda each: (-self.sign * each[0], -self.sign * self.scores[each[1]].mean())
+        )
         return [
             (middle, interval_of(self.scores[runs]), self.scores[runs], int(runs[0]))
             for middle, runs in found[:BEST]
@@ -281,4 +284,5 @@ def _sentence(
     names, share = max(shares.items(), key=lambda item: item[1])
     if share <= of.by_chance(names):
         return f"{said}; no factor explains more of the variance than chance would."
-    return f"{said}; {' with '.join(names)} explains most: {share:.0%} of the variance."
+    what = f"the interaction of {' and '.join(names)}" if names[1:] else names[0]
+    return f"{said}; {what} explains most: {share:.0%} of the variance."

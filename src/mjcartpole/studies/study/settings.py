@@ -64,6 +64,8 @@ def read_value(name: str, value: Any) -> Any:  # noqa: ANN401 - whatever a field
 
     >>> read_value("bins", [1, 3, 6, 8]), read_value("alpha", 1), read_value("mirror", "none")
     ((1, 3, 6, 8), 1.0, None)
+    >>> read_value("set", "gravity=5")
+    ('gravity=5',)
 
     Raises:
         ConfigError: It is of another kind.
@@ -76,8 +78,9 @@ def read_value(name: str, value: Any) -> Any:  # noqa: ANN401 - whatever a field
     for kind in kinds()[name]:
         if value == NONE and fits(None, kind):
             return None
-        if fits(value, kind):
-            return _as_kind(value, kind)
+        for given in (value, [value]):
+            if fits(given, kind):
+                return _as_kind(given, kind)
     raise ConfigError(f"{name} must be {_in_words(kinds()[name])}, not {value!r}")
 
 
