@@ -10,7 +10,7 @@ import dataclasses
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, Final, Self
+from typing import TYPE_CHECKING, Any, Final, Self
 
 import numpy as np
 
@@ -72,6 +72,10 @@ class Disturbances:
     """How many of the last actions are seen besides, as -1 and 1, the latest first."""
     observe_context: bool = False
     """Whether what was drawn of --vary is seen besides; for learners other than tables."""
+
+    if TYPE_CHECKING:
+        # Each field takes more than it holds: one number for all, a mapping, a text.
+        def __init__(self, **values: Any) -> None: ...
 
     def __post_init__(self) -> None:
         """Refuse what makes no sense, and put values in their usual form.
