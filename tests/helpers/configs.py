@@ -40,7 +40,6 @@ VALUES = {
     "threshold": SMALL,
     "predecessors": st.integers(1, 6),
     "fit_steps": st.none() | st.integers(20, 60),
-    "noise": st.sampled_from([0.0, 1e-9, 1e-3]),
 }
 """Of parameters that are no rates, choices or switches."""
 
@@ -53,6 +52,7 @@ def configs(draw, methods=tuple(METHODS)):
     backend, integrator = draw(
         st.sampled_from([("gym", "gym"), ("mujoco", "gym"), ("mujoco",) * 2])
     )
+    grid = draw(_grids(tiled=method == "planning" or parameters.get("tilings", 1) > 1))
     edits = [(), (), ("pole.length=0.8", "hinge.damping=0.1"), ("gravity=2",)]
     return TrainConfig(
         method=method,
@@ -64,9 +64,36 @@ def configs(draw, methods=tuple(METHODS)):
         ].name,
         episodes=draw(st.integers(1, 40)),
         seed=draw(st.integers(0, 9) | st.integers(0, 2**70)),
-        **draw(_grids(tiled=method == "planning" or parameters.get("tilings", 1) > 1)),
+        **grid,
         **parameters,
+        **draw(_disturbances(method, backend, grid["mirror"])),
     )
+
+
+@st.composite
+def _disturbances(draw, method, backend, mirror):
+    """Draw what is added; for each method that is compiled anew."""
+    if method not in at_night(METHODS, fast=["q-learning"]) or draw(st.booleans()):
+        return {}
+    some = {
+        "delay": st.integers(0, 5),
+        "hold": RATES,
+        "drop": RATES,
+        "lag": st.sampled_from([0.001, 0.02, 0.3]),
+        "force_noise": st.sampled_from([0.1, 5.0]),
+        "push": st.sampled_from([("0.3@~0.2s",), ("0.1@~0.1s", "0.2@~1s")]),
+        "sensor_delay": st.integers(0, 5),
+        "noise": st.sampled_from([0.001, (0.0, 0.1, 0.02, 0.3)]),
+        "quantize": st.sampled_from([0.01, (0.5, 0.0, 0.1, 1.0)]),
+    }
+    if not mirror:
+        some |= {"bias": st.sampled_from([0.1, (0, 0, -0.05, 0)])}
+    if method not in ("planning", "identify"):
+        some |= {"observe_actions": st.integers(1, 3)}
+    chosen = draw(st.lists(st.sampled_from(sorted(some)), min_size=1, max_size=4, unique=True))
+    varied = {"vary": ("pole.length=0.6:1.4",), "pool": 2, "widen": 5}
+    more = varied if backend == "mujoco" and draw(st.booleans()) else {}
+    return {name: draw(some[name]) for name in chosen} | more
 
 
 @st.composite

@@ -75,7 +75,7 @@ class Disturbances:
 
     if TYPE_CHECKING:
         # Each field takes more than it holds: one number for all, a mapping, a text.
-        def __init__(self, **values: Any) -> None: ...
+        def __init__(self, **values: Any) -> None: ...  # noqa: ANN401
 
     def __post_init__(self) -> None:
         """Refuse what makes no sense, and put values in their usual form.
