@@ -33,7 +33,7 @@ from mjcartpole.learning.policy import Policy
 from mjcartpole.learning.presets import PRESETS
 from mjcartpole.learning.training import train
 from mjcartpole.studies.film import play
-from mjcartpole.studies.policy_setup import PolicySetup
+from mjcartpole.studies.policy_setup import where_trained
 from mjcartpole.task import CARTPOLE_V1
 
 # What was tried around `tuned`: each entry changes its defaults.
@@ -201,8 +201,7 @@ def stand(job: tuple[str, TrainConfig, int]) -> int:
     """Train one seed; returns after how many starts the poles lean less than `LEAN` to the end."""
     name, config, starts = job
     policy = train(config).policy
-    model = config.load_model() if config.backend == "mujoco" else "cartpole"
-    setup = PolicySetup(name, policy, config.backend, model, config.integrator, task=config.rules)
+    setup = where_trained(name, policy, config, config.load_model())
     takes = [take for take in play(setup, starts) if take.episode.ending == ENDINGS[0]]
     return sum(bool((np.cos(take.states[-100:, 2::2]) > math.cos(LEAN)).all()) for take in takes)
 

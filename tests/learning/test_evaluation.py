@@ -2,6 +2,7 @@
 
 import pytest
 
+from mjcartpole.disturbances.disturbances import Disturbances
 from mjcartpole.errors import ConfigError, ModelNotFoundError
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.evaluation import evaluate
@@ -47,6 +48,11 @@ def test_the_summary_is_plain():
         "minimum": pytest.approx(9, abs=2),
         "endings": {"time limit": 0, "off the track": 0, "pole fell": 2},
     }
+
+
+def test_the_summary_says_what_was_added():
+    played = evaluate(falling, episodes=2, disturbances=Disturbances(delay=1, noise=0.5))
+    assert played.summary()["disturbances"] == "--delay 1 --noise 0.5"
 
 
 @pytest.mark.parametrize("backend", ["mujoco", "gym"])

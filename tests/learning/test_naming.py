@@ -7,9 +7,10 @@ import hypothesis.strategies as st
 import pytest
 from hypothesis import given
 
+from mjcartpole.disturbances.disturbances import Disturbances
 from mjcartpole.learning import naming
 from mjcartpole.learning.config import TrainConfig
-from mjcartpole.learning.naming import in_flags, namesakes, run_name, shortened
+from mjcartpole.learning.naming import added_flags, in_flags, namesakes, run_name, shortened
 from mjcartpole.learning.presets import PRESETS
 
 numbers = st.floats(0, 1).filter(lambda x: x != 0) | st.sampled_from([0.1, 1, 1e-5, 0.0])
@@ -25,6 +26,9 @@ configs = st.fixed_dictionaries(
             ["long", "long.xml", "LONG.xml", "a/long.xml", "b/long.xml", "own_timestep"]
         ),
         "set": st.lists(edits, max_size=3).map(tuple),
+        "vary": st.sampled_from(["force=8:10", "force=8,10", "force=8:10:log", "gravity=8:10"]),
+        "push": st.sampled_from([("0.5@4s",), ("0.5@~4s",), ("-0.5@4s",), ("0.5@4s", "1@2s")]),
+        "delay": st.integers(0, 3),
         "own_timestep": st.booleans(),
         "integrator": st.sampled_from(["gym", "mujoco"]),
         "episodes": st.integers(1, 10**9),
@@ -49,6 +53,16 @@ def test_a_preset_alone_is_named_alone(preset):
     config = TrainConfig.preset(preset, seed=3)
     assert run_name(preset, config) == f"{preset}-mujoco-seed3"
     assert in_flags(preset, config) == ""
+
+
+def test_flags_are_what_the_command_line_takes() -> None:
+    given = {"vary": ("force=8,10", "gravity=1:2"), "push": "0.5@~4s", "noise": (0.1, 0, 0, 2)}
+    some = Disturbances(**given, lag=0.5, observe_actions=2)
+    assert (
+        added_flags(some)
+        == "--vary force=8,10 gravity=1:2 --lag 0.5 --push '0.5@~4s' --noise 0.1,0,0,2"
+    )
+    assert in_flags("tuned", TrainConfig(observe_actions=2)) == "--observe-actions 2"
 
 
 @given(configs, configs)

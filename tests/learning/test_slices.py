@@ -8,7 +8,14 @@ import pytest
 from mjcartpole.errors import ConfigError
 from mjcartpole.learning.discretizer import Discretizer
 from mjcartpole.learning.policy import Policy
-from mjcartpole.learning.slices import choose_axes, edges_along, slices, stations, visit_edges
+from mjcartpole.learning.slices import (
+    check_of_state,
+    choose_axes,
+    edges_along,
+    slices,
+    stations,
+    visit_edges,
+)
 
 LOW, HIGH = (-2.4, -0.75, -0.2, -1.5), (2.4, 0.75, 0.2, 1.5)
 TUNED = Discretizer((1, 3, 6, 8), LOW, HIGH)
@@ -47,6 +54,28 @@ def test_what_is_shown_if_nothing_is_asked_for():
 def test_what_makes_no_sense_is_refused(asked, words):
     with pytest.raises(ConfigError, match=words):
         choose_axes(TUNED, **asked)
+
+
+def test_actions_before_are_dimensions_of_their_own():
+    grid = Discretizer((1, 3, 6, 8, 2, 2), (*LOW, -1, -1), (*HIGH, 1, 1), actions=2)
+    axes = choose_axes(grid)
+    assert (axes.dims, axes.over) == ((2, 3), 1)
+    assert axes.held[4:] == (1.0, 1.0)
+    table = table_of(grid)
+    drawn = slices("", grid, table, choose_axes(grid, over="action_2_before"), shown=("action",))
+    assert len(drawn.fields[0]) == 2
+    left = slices(
+        "",
+        grid,
+        table,
+        choose_axes(grid, over="none", at={"action_1_before": -1}),
+        shown=("action",),
+    )
+    assert left.notes == ["at x_dot = 0, action_1_before = -1, action_2_before = 1"]
+    expected = np.argmax(table[0, 1, :, :, 0, 1], axis=-1).T
+    assert left.fields[0][0].values.tolist() == expected.tolist()
+    with pytest.raises(ConfigError, match="of a state 'action_1_before' is unknown"):
+        check_of_state(grid, ["action_1_before"])
 
 
 def test_a_grid_for_something_else_is_refused():

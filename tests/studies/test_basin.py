@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from mjcartpole.disturbances.disturbances import Disturbances
 from mjcartpole.envs.backend import make_env
 from mjcartpole.errors import ConfigError
 from mjcartpole.learning.discretizer import Discretizer
@@ -31,6 +32,29 @@ def test_both_engines_agree_with_episodes_played_one_by_one(backend):
     assert states[0].tolist() == starts()[3].tolist()
     assert episode.steps == found[3]
     assert len(set(found.tolist())) > 5
+
+
+@pytest.mark.parametrize("backend", ["mujoco", "gym"])
+def test_both_engines_disturb_alike(backend):
+    vary = {"vary": "pole.length=0.5:2", "pool": 3} if backend == "mujoco" else {}
+    some = Disturbances(**vary, delay=1, noise=0.02, hold=0.1, push="0.5@~0.5s", sensor_delay=1)
+    setup = PolicySetup("leans", LEANS, backend, disturbances=some)
+    found = survival(setup, starts())
+    assert found.tolist() == survival(setup, starts(), "python").tolist()
+    assert found.tolist() != survival(PolicySetup("leans", LEANS, backend), starts()).tolist()
+
+
+def test_a_table_that_looks_at_actions_starts_before_any():
+    grid = Discretizer((1, 1, 2, 1, 2), (*BANG.low, -1), (*BANG.high, 1), actions=1)
+    policy = Policy(grid, np.stack([LEANS.q_table] * 2, axis=4))
+    sees = Disturbances(observe_actions=1)
+    grid = basin(PolicySetup("sees", policy, disturbances=sees), points=5)
+    blind = basin(PolicySetup("leans", LEANS), points=5)
+    assert grid.fields[0][0].values.tolist() == blind.fields[0][0].values.tolist()
+    assert grid.notes == blind.notes
+    for asked in ({"dims": ("theta", "action_1_before")}, {"at": {"action_1_before": 1}}):
+        with pytest.raises(ConfigError, match="of a state 'action_1_before' is unknown"):
+            basin(PolicySetup("sees", policy, disturbances=sees), **asked)
 
 
 def test_several_poles_start_where_they_are_put():

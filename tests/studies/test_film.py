@@ -311,6 +311,7 @@ def test_a_film_takes_the_time_that_control_steps_take():
             PolicySetup("it", some_policy(), model=model),
             Episode(0, 100.0, 100, "time limit"),
             states,
+            [],
         )
         for model in ("cartpole", cartpole)
     )

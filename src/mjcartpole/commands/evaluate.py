@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 from mjcartpole.commands.options import Command, Included, UsageError
-from mjcartpole.commands.printing import counted, print_evaluation, print_seeds
-from mjcartpole.learning.evaluation import EPISODES, Evaluation, evaluate
+from mjcartpole.commands.printing import counted, print_evaluation, print_seeds, with_added
+from mjcartpole.learning.evaluation import EPISODES
 from mjcartpole.studies.eval_target import EvalTarget
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ class Evaluate(Command):
                 "evaluate needs a RUN-OR-POLICY, or --policy and the name of a controller; "
                 "see mjcartpole evaluate --help"
             )
-        result = self._evaluate(setup)
+        result = setup.evaluate(self.episodes)
         if self.json:
             print(json.dumps({**self._head(setup), **result.summary()}))
         else:
@@ -63,7 +63,7 @@ class Evaluate(Command):
 
         learned = learned_seeds(source)
         setups = {seed: set_up(run, self.target) for seed, run in learned.items()}
-        found = [SeedResult(seed, self._evaluate(setup)) for seed, setup in setups.items()]
+        found = [SeedResult(seed, setup.evaluate(self.episodes)) for seed, setup in setups.items()]
         config = read_config(next(iter(learned.values())))[2]
         self._print_many(ManyResult(config, tuple(found)), next(iter(setups.values())))
         return 0
@@ -71,9 +71,9 @@ class Evaluate(Command):
     def _print_many(self, many: "ManyResult", first: "PolicySetup") -> None:
         if not self.json:
             print(
-                f"\ngreedy evaluation on {first.backend}{self._chosen_model(first)}: "
-                f"{counted(len(many.seeds), 'seed')}, {counted(self.episodes, 'episode')} each, "
-                f"seed {first.seed}\n"
+                f"\ngreedy evaluation on {first.backend}{self._chosen_model(first)}"
+                f"{with_added(first.disturbances)}: {counted(len(many.seeds), 'seed')}, "
+                f"{counted(self.episodes, 'episode')} each, seed {first.seed}\n"
             )
             print_seeds(many)
             return
@@ -85,17 +85,6 @@ class Evaluate(Command):
         aggregate = many.aggregate()
         figures = aggregate.summary() if aggregate else None
         print(json.dumps({**self._head(first), "seeds": each, "greedy_return": figures}))
-
-    def _evaluate(self, setup: "PolicySetup") -> Evaluation:
-        return evaluate(
-            setup.policy,
-            backend=setup.backend,
-            model=setup.model,
-            integrator=setup.integrator,
-            task=setup.task,
-            episodes=self.episodes,
-            seed=setup.seed,
-        )
 
     def _head(self, setup: "PolicySetup") -> dict[str, str]:
         return {"policy": str(self.source or self.policy), "model": _model_name(setup)}

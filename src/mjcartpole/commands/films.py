@@ -9,7 +9,7 @@ from typing import Any
 from PIL import Image
 
 from mjcartpole.commands.options import VIDEOS
-from mjcartpole.commands.printing import counted
+from mjcartpole.commands.printing import counted, with_added
 from mjcartpole.commands.progress import progress_bar
 from mjcartpole.errors import RunError
 from mjcartpole.files import atomic_write, free_path
@@ -22,7 +22,7 @@ from mjcartpole.media.video import Video, write_video
 from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.signals import Interrupted, StopSignals
 from mjcartpole.studies.film import Film, Frame, Rollout, play
-from mjcartpole.studies.policy_setup import PolicySetup
+from mjcartpole.studies.policy_setup import PolicySetup, where_trained
 from mjcartpole.studies.video_options import VideoOptions
 
 SHEET_FRAMES = 10
@@ -114,10 +114,12 @@ def raise_noted(signals: StopSignals) -> None:
 def what_happened(casts: Casts) -> str:
     """Return in words what a film shows."""
     takes = [take for takes in casts for take in takes]
+    alike = {take.setup.disturbances.seen_by(0) for take in takes}
+    added = with_added(alike.pop()) if len(alike) == 1 else ", each with its own disturbances"
     if len(takes) == 1:
-        return f"{counted(takes[0].episode.steps, 'step')}, {takes[0].episode.ending}"
+        return f"{counted(takes[0].episode.steps, 'step')}, {takes[0].episode.ending}{added}"
     steps = [take.episode.steps for take in takes]
-    return f"{len(takes)} episodes of {min(steps)} to {max(steps)} steps"
+    return f"{len(takes)} episodes of {min(steps)} to {max(steps)} steps{added}"
 
 
 def write_sheet(casts: Casts, look: VideoOptions, path: Path, signals: StopSignals) -> None:
@@ -156,12 +158,7 @@ def film_result(
     Raises:
         Interrupted: See `film`.
     """
-    config = result.config
-    model = cartpole if config.backend == "mujoco" else "cartpole"
-    name = folder.resolve().name
-    setup = PolicySetup(
-        name, result.policy, config.backend, model, config.integrator, task=config.rules
-    )
+    setup = where_trained(folder.resolve().name, result.policy, result.config, cartpole)
     path = own_film(folder, summary) or default_path([setup], ".mp4")
     # Named before it is drawn: resumed after a kill, the training takes no second name.
     summary["video"] = str(path)

@@ -3,6 +3,7 @@
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from mjcartpole.disturbances.disturbances import Disturbances
     from mjcartpole.learning.evaluation import Evaluation
     from mjcartpole.studies.seeds import ManyResult
 
@@ -17,6 +18,14 @@ def counted(count: int, what: str) -> str:
     return f"{count:,} {what}" if count == 1 else f"{count:,} {what}s"
 
 
+def with_added(disturbances: "Disturbances") -> str:
+    """Return what a headline says of disturbances; nothing where there are none."""
+    from mjcartpole.learning.naming import added_flags
+
+    flags = added_flags(disturbances)
+    return f", with {flags}" if flags else ""
+
+
 def print_evaluation(result: "Evaluation", where: str = "") -> None:
     """Print mean, minimum, and how the episodes ended.
 
@@ -25,7 +34,7 @@ def print_evaluation(result: "Evaluation", where: str = "") -> None:
         where: What else is to be said of where.
     """
     print(
-        f"\ngreedy evaluation on {result.backend}{where}: "
+        f"\ngreedy evaluation on {result.backend}{where}{with_added(result.disturbances)}: "
         f"{counted(len(result.episodes), 'episode')}, seed {result.seed}\n"
         f"  mean return {result.mean:.2f}, minimum {plain(result.minimum)}"
     )

@@ -14,7 +14,7 @@ from mjcartpole.commands.watched_file import POLL, SavedAgainError, Watched
 from mjcartpole.errors import MjCartPoleError
 from mjcartpole.files import atomic_write
 from mjcartpole.learning.config import TrainConfig
-from mjcartpole.learning.evaluation import Evaluation, evaluate
+from mjcartpole.learning.evaluation import Evaluation
 from mjcartpole.learning.training import Training, TrainResult
 from mjcartpole.media.renderer import open_renderer
 from mjcartpole.output import stdout_problem
@@ -22,7 +22,7 @@ from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.signals import StopSignals
 from mjcartpole.studies.film import play
 from mjcartpole.studies.parity import Result, Subject, run_ladder
-from mjcartpole.studies.policy_setup import PolicySetup
+from mjcartpole.studies.policy_setup import PolicySetup, where_trained
 from mjcartpole.studies.video_options import VideoOptions
 from mjcartpole.task import Task
 
@@ -110,20 +110,10 @@ class WatchWork:
         self.watched.check()
         self._hold_against_itself(cartpole)
         result = self._train(cartpole)
-        integrator = result.config.integrator
-        episodes = _count_evaluated(result)
-        evaluation = evaluate(
-            result.policy,
-            model=cartpole,
-            integrator=integrator,
-            task=self.config.rules,
-            episodes=episodes,
-        )
-        _say("greedy", _greedy(evaluation))
+        setup = where_trained(name, result.policy, result.config, cartpole)
+        _say("greedy", _greedy(setup.evaluate(_count_evaluated(result))))
         self.watched.check()
         if self.video:
-            rules = self.config.rules
-            setup = PolicySetup(name, result.policy, "mujoco", cartpole, integrator, task=rules)
             self._film(setup, VIDEOS / f"{name}.mp4")
         _say("done", f"in {time.perf_counter() - started:.1f} s")
 

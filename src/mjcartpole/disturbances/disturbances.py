@@ -29,24 +29,12 @@ MOST_ACTIONS: Final = 8
 
 
 @dataclass(frozen=True, kw_only=True)
-class Disturbances:
-    """What is added to a task; the defaults add nothing.
-
-    >>> Disturbances(vary={"pole.length": (0.5, 1.5)}, delay=2, noise=0.01)
-    Disturbances(vary=('pole.length=0.5:1.5',), delay=2, noise=(0.01,))
-
-    Each field takes the same everywhere: here, in `gymnasium.make`, in a `TrainConfig`, and as a
-    flag of the command line.
-    """
+class WorldDisturbances:
+    """What is added to a task, whoever plays it; the defaults add nothing."""
 
     vary: tuple[str, ...] = ()
     """Numbers of the model that each episode draws anew, by the names that --set knows:
     pole.length=0.5:1.5 uniformly, cart.mass=0.1:10:log by its logarithm, force=8,10,12 one of."""
-    pool: int | None = None
-    """Draw so many models once, the same for every seed, and give each episode one of them; 0 draws
-    anew for each, which takes some milliseconds. Left out: 100 in a training, 0 elsewhere."""
-    widen: int = 0
-    """Over so many episodes, let the ranges widen from their middle to their whole."""
     delay: int = 0
     """Control steps from an action to its push; none pushes before."""
     hold: float = 0.0
@@ -68,6 +56,24 @@ class Disturbances:
     """What is added to all that is seen; one number, or four."""
     quantize: tuple[float, ...] = ()
     """What is seen is a multiple of this; one number, or four, 0 for none."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Disturbances(WorldDisturbances):
+    """What is added to a task; the defaults add nothing.
+
+    >>> Disturbances(vary={"pole.length": (0.5, 1.5)}, delay=2, noise=0.01)
+    Disturbances(vary=('pole.length=0.5:1.5',), delay=2, noise=(0.01,))
+
+    Each field takes the same everywhere: here, in `gymnasium.make`, in a `TrainConfig`, and as a
+    flag of the command line.
+    """
+
+    pool: int | None = None
+    """Draw so many models once, the same for every seed, and give each episode one of them; 0 draws
+    anew for each, which takes some milliseconds. Left out: 100 in a training, 0 elsewhere."""
+    widen: int = 0
+    """Over so many episodes, let the ranges widen from their middle to their whole."""
     observe_actions: int = 0
     """How many of the last actions are seen besides, as -1 and 1, the latest first."""
     observe_context: bool = False

@@ -1,7 +1,8 @@
 """Disturbances at work in one environment of plain Python."""
 
+import contextlib
 import copy
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any, Self
 
 import numpy as np
@@ -81,6 +82,15 @@ class Disturber:
         if chance or np_random is not self._source:
             self._source, self._episode = np_random, episode
             self._chance = chance or Chance.of(np_random, self._index)
+
+    @contextlib.contextmanager
+    def undrawn(self) -> Iterator[None]:
+        """Take back, in the end, what is drawn for steps meanwhile; contexts are drawn."""
+        chance = self._chance
+        before = chance.rng.bit_generator.state if chance else None
+        yield
+        if chance and before:
+            chance.rng.bit_generator.state = before
 
     def draw(self, np_random: np.random.Generator) -> Context:
         """Return the context of the next episode."""

@@ -50,6 +50,7 @@ _SUMMARY_FIELDS: Final[Fields] = {
         "mean": float,
         "minimum": float,
         "endings": dict.fromkeys(ENDINGS, int),
+        "disturbances?": str,
     },
     "video?": str,
 }

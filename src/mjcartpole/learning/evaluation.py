@@ -20,6 +20,7 @@ from mjcartpole.learning.controllers import Controller
 from mjcartpole.learning.engine import Engine, choose_engine
 from mjcartpole.learning.episodes import ENDINGS, Episode
 from mjcartpole.learning.loop import play_episode
+from mjcartpole.learning.naming import added_flags
 from mjcartpole.learning.policy import Policy
 from mjcartpole.task import CARTPOLE_V1, Task, resolve
 
@@ -44,11 +45,13 @@ class Evaluation:
         backend: Who did the physics.
         seed: Seed of the first episode's starting state.
         episodes: What each came to.
+        disturbances: What was added.
     """
 
     backend: Backend
     seed: int
     episodes: tuple[Episode, ...]
+    disturbances: Disturbances = NONE
 
     @property
     def returns(self) -> npt.NDArray[np.float64]:
@@ -80,6 +83,7 @@ class Evaluation:
             "mean": self.mean,
             "minimum": self.minimum,
             "endings": self.endings,
+            **({"disturbances": added} if (added := added_flags(self.disturbances)) else {}),
         }
 
     def _repr_html_(self) -> str:
@@ -151,14 +155,14 @@ def evaluate(
         chance = Chance.of(rng) if disturbances.are_some else None
         loop = CompiledLoop(backend, model, integrator, rules, disturbances)
         log = loop.play(policy, rng, episodes, chance)
-        return Evaluation(backend, seed, tuple(log))
+        return Evaluation(backend, seed, tuple(log), disturbances)
     env = make_env(backend, model, integrator, rules, disturbances)
     played = tuple(
         play_episode(env, play, number=number, seed=seed if number == 0 else None)[0]
         for number in range(episodes)
     )
     env.close()
-    return Evaluation(backend, seed, played)
+    return Evaluation(backend, seed, played, disturbances)
 
 
 def player(policy: PolicyLike, task: Task) -> Callable[[npt.NDArray[np.float32]], Any]:

@@ -1,5 +1,6 @@
 """Episodes as generators over any gymnasium environment: the reference loop."""
 
+import contextlib
 import math
 from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
@@ -111,9 +112,7 @@ def play_episode(
     Returns:
         The episode, and its states from the first to the last, each float64 of shape (4,).
     """
-    observation, _ = env.reset(seed=seed)
-    if start is not None:
-        observation = _begin_at(env, start)
+    observation = env.reset(seed=seed)[0] if start is None else _begin_at(env, start, seed)
     states = [_state_of(env)]
     total, over, terminated = 0.0, False, False
     try:
@@ -127,13 +126,17 @@ def play_episode(
     return _ended(env, number, total, len(states) - 1, terminated), states
 
 
-def _begin_at(env: gymnasium.Env[Any, Any], start: Sequence[float]) -> npt.NDArray[np.float32]:
-    """Put an environment into a state; returns what is seen of it."""
+def _begin_at(
+    env: gymnasium.Env[Any, Any], start: Sequence[float], seed: int | None
+) -> npt.NDArray[np.float32]:
+    """Begin an episode in a state; returns what is seen of it."""
+    disturber = env.get_wrapper_attr("disturber") if env.has_wrapper_attr("disturber") else None
+    with disturber.undrawn() if disturber else contextlib.nullcontext():
+        env.reset(seed=seed)
     env.unwrapped.state = np.array(start)  # type: ignore[attr-defined]
     seen = _state_of(env)
     if math.isinf(getattr(env.unwrapped, "theta_threshold_radians", 0.0)):
         seen[2::2] = wrapped(seen[2::2])
-    disturber = env.get_wrapper_attr("disturber") if env.has_wrapper_attr("disturber") else None
     if disturber is None:
         return seen.astype(np.float32)
     observation: npt.NDArray[np.float32] = disturber.first(seen, "state")[0]

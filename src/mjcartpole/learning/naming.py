@@ -4,10 +4,11 @@ import hashlib
 import os
 import re
 import shlex
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path, PurePath
 from typing import Any, Final
 
+from mjcartpole.disturbances.disturbances import Disturbances
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.presets import PRESETS
 
@@ -59,7 +60,21 @@ def in_flags(preset: str, config: TrainConfig) -> str:
     """
     changed = _changed(preset, config)
     said = {name: changed[name] for name in changed if name not in ("episodes", "log_every")}
-    return " ".join(_flag(name.replace("_", "-"), value) for name, value in said.items())
+    return flags_of(said)
+
+
+def flags_of(values: Mapping[str, Any]) -> str:
+    """Return fields with their values as flags.
+
+    >>> flags_of(Disturbances(delay=2, push="5@2s").given)
+    '--delay 2 --push 5@2s'
+    """
+    return " ".join(_flag(name.replace("_", "-"), value) for name, value in values.items())
+
+
+def added_flags(disturbances: Disturbances) -> str:
+    """Return what is added to a task, as flags of a command that plays."""
+    return flags_of(disturbances.seen_by(0).given)
 
 
 def shortened(text: str, most: int) -> str:
@@ -88,8 +103,10 @@ def _changes(preset: str, config: TrainConfig) -> str:
     changed = _changed(preset, config)
     words = [re.sub(r"[^a-z0-9._+-]+", "_", word.lower()) for word in _readable(changed)]
     whole = "-".join(words)
-    edits = all(_EDIT.fullmatch(edit) for edit in changed.get("set", ()))
-    if edits and _MODEL.fullmatch(changed.get("model", "cartpole")) and len(whole) <= MOST_CHANGES:
+    plain = all(_EDIT.fullmatch(edit) for edit in changed.get("set", ()))
+    # Signs tell ranges and shoves apart, and no folder's name has them.
+    plain &= not changed.keys() & {"vary", "push"}
+    if plain and _MODEL.fullmatch(changed.get("model", "cartpole")) and len(whole) <= MOST_CHANGES:
         return whole
     fitting, digest = list[str](), _digest(repr(changed))
     for word in words:
@@ -110,6 +127,8 @@ def _readable(changed: dict[str, Any]) -> Iterator[str]:
                 yield PurePath(value).name if name == "model" else f"{name}_{value}"
             case tuple() if name == "set":
                 yield from (edit.replace("=", "") for edit in value)
+            case (str(), *_):
+                yield "_".join((name, *value))
             case tuple():
                 yield name + "_".join(map(_number, value))
             case _:
@@ -120,7 +139,7 @@ def _flag(flag: str, value: Any) -> str:
     match value:
         case bool():
             return f"--{flag}" if value else f"--no-{flag}"
-        case tuple() if flag == "set":
+        case (str(), *_):
             return f"--{flag} {shlex.join(value)}"
         case tuple():
             return f"--{flag} {','.join(map(_number, value))}"

@@ -117,7 +117,7 @@ class Policy:
         from mjcartpole.media.notebook import with_picture, with_plot  # noqa: PLC0415
 
         grid, table = self.discretizer, self.q_table
-        if len(grid.bins) % 2 or len(grid.bins) < 4:
+        if (n := len(grid.bins) - grid.actions) % 2 or n < 4:
             return with_picture(repr(self), None)
         shown: tuple[Any, ...] = ("action", "advantage")
         return with_plot(

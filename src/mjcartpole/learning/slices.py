@@ -1,6 +1,6 @@
 """Slices of a table: what it says over two dimensions of the state, the others held."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -43,10 +43,22 @@ def names_of(grid: Discretizer) -> tuple[str, ...]:
     Raises:
         ConfigError: It is for no cart-pole's observations.
     """
-    n = len(grid.bins)
+    n = len(grid.bins) - grid.actions
     if n < 4 or n % 2:
         raise ConfigError(f"a policy for observations of {n} values is for no cart-pole")
-    return state_names(n // 2 - 1)
+    actions = (f"action_{number}_before" for number in range(1, grid.actions + 1))
+    return *state_names(n // 2 - 1), *actions
+
+
+def check_of_state(grid: Discretizer, names: Iterable[str]) -> None:
+    """Refuse dimensions of a table that are none of a state.
+
+    Raises:
+        ConfigError: See above.
+    """
+    known = names_of(grid)
+    for name in names:
+        check_known("dimension of a state", name, known[: len(known) - grid.actions])
 
 
 def choose_axes(
@@ -61,7 +73,8 @@ def choose_axes(
         grid: The table's.
         dims: Names of the horizontal and the vertical one; angle and angular velocity if left out.
         over: Name of the one that differs from slice to slice, or "none".
-        at: Values at which others are held; 0, or the middle of their range, if left out.
+        at: Values at which others are held; 0, or the middle of their range, if left out; of an
+            action before 1.
 
     Raises:
         ConfigError: There is no such dimension, or one is asked for twice.
@@ -88,6 +101,8 @@ def choose_axes(
 
 def _middle(grid: Discretizer, dimension: int) -> float:
     low, high = grid.low[dimension], grid.high[dimension]
+    if dimension >= len(grid.bins) - grid.actions:
+        return high  # Pushed to the right, as it counts before the first one.
     return 0.0 if low <= 0 <= high else (low + high) / 2
 
 

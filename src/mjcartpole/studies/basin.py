@@ -6,12 +6,14 @@ from typing import Final
 
 import numpy as np
 import numpy.typing as npt
+from gymnasium.utils import seeding
 
+from mjcartpole.disturbances.contexts import Chance
 from mjcartpole.envs.backend import make_env
 from mjcartpole.errors import ConfigError
 from mjcartpole.learning.engine import Engine, choose_engine
 from mjcartpole.learning.loop import play_episode
-from mjcartpole.learning.slices import Axes, choose_axes, names_of, states_over
+from mjcartpole.learning.slices import Axes, check_of_state, choose_axes, names_of, states_over
 from mjcartpole.media.grid_plot import Field, Grid
 from mjcartpole.studies.policy_setup import PolicySetup
 from mjcartpole.task import Task
@@ -47,11 +49,12 @@ def basin(
         raise ConfigError(f"points must be a whole number from 2 to {MOST_POINTS:,}, not {points}")
     policy, task = setup.table, setup.task
     policy.check_fits(setup.cartpole.poles, setup.cartpole.name)
+    check_of_state(policy.discretizer, (*dims, *(at or {})))
     axes = choose_axes(policy.discretizer, dims, "none", at)
     a, b = (np.linspace(*_range(axes, place, setup), points + 1) for place in axes.dims)
-    starts = states_over((a, b), axes.dims, axes.held)
+    names = names_of(policy.discretizer)[: 2 + 2 * policy.poles]
+    starts = states_over((a, b), axes.dims, axes.held[: len(names)])
     steps = survival(setup, starts).astype(np.float64).reshape(points, points)
-    names = names_of(policy.discretizer)
     shown = names[axes.dims[0]], names[axes.dims[1]]
     held = [f"{name} = {axes.held[i]:.3g}" for i, name in enumerate(names) if i not in axes.dims]
     return Grid(
@@ -90,13 +93,17 @@ def survival(
         SimulationError: The physics diverged; names episode and step.
     """
     cartpole = setup.cartpole if setup.backend == "mujoco" else None
-    physics = (setup.backend, setup.model, setup.integrator, setup.task)
+    rng, _ = seeding.np_random(setup.seed)
+    chance = Chance.of(rng) if setup.disturbances.are_some else None
     if choose_engine(engine, setup.backend, cartpole, setup.task) == "compiled":
         from mjcartpole.learning.compiled import CompiledLoop  # noqa: PLC0415 - it is heavy
 
-        log = CompiledLoop(*physics).play(setup.table, starts, len(starts))
+        log = CompiledLoop(*setup.world).play(setup.table, starts, len(starts), chance)
         return log.columns.steps.astype(np.int64)
-    with contextlib.closing(make_env(*physics)) as env:
+    with contextlib.closing(make_env(*setup.world)) as env:
+        if chance:
+            env.unwrapped.np_random = rng
+            env.get_wrapper_attr("disturber").follow(rng, chance)
         played = [
             play_episode(env, setup.table, number=number, start=start)[0].steps
             for number, start in enumerate(starts.tolist())

@@ -3,13 +3,14 @@
 from dataclasses import dataclass
 from pathlib import Path
 
+from mjcartpole.disturbances.changes import DisturbanceChanges
 from mjcartpole.envs.backend import Backend
 from mjcartpole.integrator import Integrator
 from mjcartpole.rule_changes import RuleChanges
 
 
 @dataclass(frozen=True)
-class EvalTarget(RuleChanges):
+class EvalTarget(RuleChanges, DisturbanceChanges):
     """Where a policy is played; None means: where it was trained."""
 
     backend: Backend | None = None
@@ -22,6 +23,8 @@ class EvalTarget(RuleChanges):
     """Let a control step be one physics step of that model's file; as a run that was trained so."""
     integrator: Integrator | None = None
     """The run's own if left out."""
+    undisturbed: bool = False
+    """Leave out all disturbances that the run was trained with; those given here are added."""
     seed: int | None = None
     """Seeds the starting states; the same as after training if left out."""
     allow_assets: tuple[Path, ...] = ()

@@ -3,9 +3,9 @@
 import contextlib
 import functools
 import itertools
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
-from typing import Final
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
@@ -37,11 +37,13 @@ class Rollout:
         setup: Who played, and where.
         episode: What it came to.
         states: From the first to the last, one row each, shape (steps + 1, 4) with one pole.
+        seen: What the policy saw before each step.
     """
 
     setup: PolicySetup
     episode: Episode
     states: npt.NDArray[np.float64] = field(repr=False)
+    seen: list[npt.NDArray[np.float32]] = field(repr=False)
 
     def places(self, look: VideoOptions) -> npt.NDArray[np.float64]:
         """Where in the episode each frame of a film lies, in control steps."""
@@ -63,7 +65,7 @@ class Rollout:
         state = state_at(self.states, place)
         if step >= self.episode.steps:
             return Moment(self.episode.steps, self.episode.total, state)
-        observation = self.setup.task.seen(self.states[step]).astype(np.float32)
+        observation = self.seen[step]
         values = policy.values(observation) if isinstance(policy, Policy) else None
         return Moment(step, self.totals[step], state, policy(observation), values)
 
@@ -78,15 +80,25 @@ def play(setup: PolicySetup, episodes: int = 1) -> list[Rollout]:
     """
     check_count(episodes, setup.seed)
     setup.policy.check_fits(setup.cartpole.poles, setup.cartpole.name)
-    act, takes = player(setup.policy, setup.task), []
-    with contextlib.closing(
-        make_env(setup.backend, setup.model, setup.integrator, setup.task)
-    ) as env:
+    act, takes, varies = player(setup.policy, setup.task), [], bool(setup.disturbances.vary)
+    with contextlib.closing(make_env(*setup.world)) as env:
         for number in range(episodes):
-            seed = setup.seed if number == 0 else None
-            episode, states = play_episode(env, act, number=number, seed=seed)
-            takes.append(Rollout(setup, episode, np.array(states)))
+            seed, seen = setup.seed if number == 0 else None, list[npt.NDArray[np.float32]]()
+            episode, states = play_episode(env, _noting(act, seen), number=number, seed=seed)
+            drawn: Any = env.unwrapped
+            own = replace(setup, model=drawn.simulation.cartpole) if varies else setup
+            takes.append(Rollout(own, episode, np.array(states), seen))
     return takes
+
+
+def _noting(act: Callable[[Any], Any], seen: list[Any]) -> Callable[[Any], Any]:
+    """Return what acts the same and notes what it saw."""
+
+    def acts(observation: npt.NDArray[np.float32]) -> Any:  # noqa: ANN401 - an action
+        seen.append(observation)
+        return act(observation)
+
+    return acts
 
 
 class Film:
@@ -111,14 +123,12 @@ class Film:
         self._casts = casts
         self._look = look
         with contextlib.ExitStack() as opened:
-            self._renderers = [
-                opened.enter_context(_open_renderer(takes[0].setup, look)) for takes in casts
-            ]
+            self._stages = [_Stage(takes[0].setup, look, opened) for takes in casts]
             self._open = opened.pop_all()
         self.length = sum(
             max(len(take.places(look)) for take in takes) for takes in zip(*casts, strict=True)
         )
-        self.drawn_by: str = self._renderers[0].kind
+        self.drawn_by: str = self._stages[0].renderer.kind
 
     def __enter__(self) -> "Film":
         return self
@@ -130,27 +140,49 @@ class Film:
         """Draw it, one frame at a time; an array may be used again for the next one."""
         labels = [takes[0].setup.name for takes in self._casts]
         for takes in zip(*self._casts, strict=True):
-            streams = [self._draw(*pair) for pair in zip(takes, self._renderers, strict=True)]
+            streams = [self._draw(*pair) for pair in zip(takes, self._stages, strict=True)]
             yield from streams[0] if len(streams) == 1 else side_by_side(streams, labels)
 
     def contact_sheet(self, count: int) -> Frame:
         """Equally spaced moments of the first stage's first episode, as one picture."""
-        take, renderer = self._casts[0][0], self._renderers[0]
+        take, stage = self._casts[0][0], self._stages[0]
         places, control_step = take.places(self._look), take.setup.cartpole.control_step
         chosen = [float(places[index]) for index in equally_spaced(len(places), count)]
-        frames = [frame.copy() for frame in self._draw_places(take, renderer, chosen)]
+        frames = [frame.copy() for frame in self._draw_places(take, stage, chosen)]
         return sheet(frames, [time_label(place, control_step) for place in chosen])
 
-    def _draw(self, take: Rollout, renderer: Renderer) -> Iterator[Frame]:
-        return self._draw_places(take, renderer, take.places(self._look))
+    def _draw(self, take: Rollout, stage: "_Stage") -> Iterator[Frame]:
+        return self._draw_places(take, stage, take.places(self._look))
 
     def _draw_places(
-        self, take: Rollout, renderer: Renderer, places: Sequence[float] | npt.NDArray[np.float64]
+        self, take: Rollout, stage: "_Stage", places: Sequence[float] | npt.NDArray[np.float64]
     ) -> Iterator[Frame]:
+        renderer = stage.showing(take.setup)
         overlay = Overlay(renderer.scene) if self._look.overlay else None
         for place in places:
             frame = renderer.render(state_at(take.states, place))
             yield frame if overlay is None else overlay.draw(frame, take.moment(place))
+
+
+class _Stage:
+    """What draws one episode after the other, each with the model that moves in it."""
+
+    def __init__(
+        self, setup: PolicySetup, look: VideoOptions, opened: contextlib.ExitStack
+    ) -> None:
+        self._look, self._opened = look, opened.enter_context(contextlib.ExitStack())
+        self._open(setup)
+
+    def _open(self, setup: PolicySetup) -> None:
+        self._cartpole = setup.cartpole
+        self.renderer = self._opened.enter_context(_open_renderer(setup, self._look))
+
+    def showing(self, setup: PolicySetup) -> Renderer:
+        """Return what draws a setup's model."""
+        if self._cartpole is not setup.cartpole:
+            self._opened.close()
+            self._open(setup)
+        return self.renderer
 
 
 def _open_renderer(setup: PolicySetup, look: VideoOptions) -> Renderer:

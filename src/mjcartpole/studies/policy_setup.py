@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from mjcartpole.disturbances.disturbances import NONE, Disturbances
 from mjcartpole.envs.backend import Backend, check_backend
 from mjcartpole.errors import ConfigError
 from mjcartpole.files import is_file
@@ -13,7 +14,7 @@ from mjcartpole.integrator import Integrator
 from mjcartpole.learning import evaluation, runs
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.controllers import Controller, controller
-from mjcartpole.learning.evaluation import SEED, Player
+from mjcartpole.learning.evaluation import SEED, Evaluation, Player
 from mjcartpole.learning.policy import Policy
 from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.load import ModelLike, load_model
@@ -36,6 +37,7 @@ class PolicySetup:
         integrator: See `Simulation`.
         seed: Seeds the first episode's starting state.
         task: The rules.
+        disturbances: What is added.
     """
 
     name: str
@@ -45,11 +47,30 @@ class PolicySetup:
     integrator: Integrator = "gym"
     seed: int = SEED
     task: Task = CARTPOLE_V1
+    disturbances: Disturbances = NONE
 
     @functools.cached_property
     def cartpole(self) -> CartPole:
         """What is drawn."""
         return load_model(self.model)
+
+    @property
+    def world(self) -> tuple[Backend, ModelLike, Integrator, Task, Disturbances]:
+        """Where it is played, as both engines take it."""
+        return self.backend, self.model, self.integrator, self.task, self.disturbances
+
+    def evaluate(self, episodes: int) -> Evaluation:
+        """Play greedy episodes; see `mjcartpole.evaluate`."""
+        return evaluation.evaluate(
+            self.policy,
+            backend=self.backend,
+            model=self.model,
+            integrator=self.integrator,
+            task=self.task,
+            disturbances=self.disturbances,
+            episodes=episodes,
+            seed=self.seed,
+        )
 
     @property
     def table(self) -> Policy:
@@ -87,6 +108,16 @@ def controller_setup(name: str, target: EvalTarget = WHERE_TRAINED) -> PolicySet
     return dataclasses.replace(setup, policy=made)
 
 
+def where_trained(
+    name: str, policy: Policy, config: TrainConfig, cartpole: CartPole
+) -> PolicySetup:
+    """Return a policy where it was trained, on the model that the config names."""
+    disturbances = config.disturbances_after.seen_by(policy.actions)
+    model: ModelLike = cartpole if config.backend == "mujoco" else "cartpole"
+    world = config.backend, model, config.integrator
+    return PolicySetup(name, policy, *world, task=config.rules, disturbances=disturbances)
+
+
 def _placed(
     name: str,
     policy: Player,
@@ -97,13 +128,15 @@ def _placed(
     seed = evaluation.SEED if target.seed is None else target.seed
     evaluation.check_count(1, seed)
     backend = target.backend or config.backend
+    disturbances = _disturbances(config, target, backend).seen_by(policy.actions)
     own_model = str(run.model) if run else config.model
     if backend == "gym":
         # Gymnasium's cart-pole has neither; only what the user asks for is held against that.
         own_model = "cartpole"
         config = TrainConfig(backend="gym", task=config.rules)
     model, integrator = target.model or own_model, target.integrator or config.integrator
-    check_backend(backend, model, integrator, target.set, own_timestep=target.own_timestep)
+    asked = *target.set, *target.vary
+    check_backend(backend, model, integrator, asked, own_timestep=target.own_timestep)
     own_timestep = config.own_timestep or target.own_timestep
     played_on: ModelLike = model
     if run is not None and model == str(run.model):
@@ -111,7 +144,15 @@ def _placed(
     if target.set or (own_timestep and played_on == model):
         played_on = load_model(played_on, target.set, own_timestep=own_timestep)
     rules = target.applied_to(config.rules)
-    return PolicySetup(name, policy, backend, played_on, integrator, seed, rules)
+    return PolicySetup(name, policy, backend, played_on, integrator, seed, rules, disturbances)
+
+
+def _disturbances(config: TrainConfig, target: EvalTarget, backend: Backend) -> Disturbances:
+    """Return what is added: the run's own, but for what is asked for."""
+    own = NONE if target.undisturbed else config.disturbances_after
+    if backend == "gym":
+        own = dataclasses.replace(own, vary=(), pool=None)
+    return target.added_to(own)
 
 
 def _read(source: Path, target: EvalTarget) -> tuple[str, Policy, TrainConfig, runs.Run | None]:

@@ -14,9 +14,9 @@ import numpy.typing as npt
 from mjcartpole.errors import ConfigError, check_known
 from mjcartpole.files import is_folder
 from mjcartpole.learning.episodes import ENDINGS, SIDES
-from mjcartpole.learning.evaluation import EPISODES, evaluate
+from mjcartpole.learning.evaluation import EPISODES
 from mjcartpole.learning.records import Record, read_visits
-from mjcartpole.learning.slices import SHOWN, choose_axes, names_of, slices
+from mjcartpole.learning.slices import SHOWN, check_of_state, choose_axes, names_of, slices
 from mjcartpole.media.curve_plot import Curves
 from mjcartpole.media.endings_plot import Endings, EndingsPlot, stretches
 from mjcartpole.media.grid_plot import Grid, Kind
@@ -145,6 +145,7 @@ def phase(
         SimulationError: The physics diverged.
     """
     policy = setup.table
+    check_of_state(policy.discretizer, dims)
     axes = choose_axes(policy.discretizer, dims, "none", at)
     takes = play(setup, episodes)
     paths = [
@@ -198,17 +199,7 @@ def _count(
         kinds = record.columns.endings * len(SIDES) + record.columns.sides
         stretch = np.searchsorted(ends, np.arange(1, len(kinds) + 1))
         np.add.at(counts, (_PLACES[kinds], stretch), 1)
-        setup = find_setup(record.folder)
-        played = evaluate(
-            setup.table,
-            backend=setup.backend,
-            model=setup.model,
-            integrator=setup.integrator,
-            task=setup.task,
-            episodes=episodes,
-            seed=setup.seed,
-        )
-        for episode in played.episodes:
+        for episode in find_setup(record.folder).evaluate(episodes).episodes:
             kind = ENDINGS.index(episode.ending) * len(SIDES) + SIDES.index(episode.side)
             greedy[_PLACES[kind]] += 1
     return ends, counts, greedy

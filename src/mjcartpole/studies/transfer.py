@@ -236,7 +236,7 @@ def _play(
         # One model that diverges is no reason to lose the others.
         return Cell(name, place.name, error=str(error))
     episodes_of_all = tuple(episode for one in played for episode in one.episodes)
-    evaluation = Evaluation(place.backend, seed, episodes_of_all)
+    evaluation = Evaluation(place.backend, seed, episodes_of_all, played[0].disturbances)
     means = np.array([one.mean for one in played])
     return Cell(
         name,
