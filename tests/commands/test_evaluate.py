@@ -57,7 +57,7 @@ def test_the_summary_names_them_and_an_evaluation_gives_the_same_again(run, caps
     ("flags", "error"),
     [
         (["--delay", "500"], "delay of 500 control steps is no shorter than an episode"),
-        (["--vary", "pole.lenth=1:2"], "did you mean 'pole.length'?"),
+        (["--vary", "pole.size=1:2"], "nothing to edit is called 'pole.size'"),
         (["--noise", "-1"], "noise must be 0 or more"),
         (["--push", "5"], "push '5' is none; give N s @ seconds"),
         (["--backend", "gym", "--vary", "force=8:12"], "use backend 'mujoco'"),
