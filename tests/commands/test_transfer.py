@@ -109,6 +109,20 @@ def test_a_run_is_swept_on_its_own_model(policies, tmp_path, trained):
     assert document["points"][0]["policy"] == "mine"
 
 
+def test_disturbances_are_taken_and_swept(policies, tmp_path, capsys):
+    models = ["cartpole", "gym"]
+    Transfer(policies[:1], models=models, delay=2, noise=(0.01,), episodes=2, output=tmp_path).run()
+    assert "seed 1000000, with --delay 2 --noise 0.01\n" in capsys.readouterr().out
+    document = json.loads((tmp_path / "transfer.json").read_text())
+    assert document["disturbances"] == "--delay 2 --noise 0.01"
+    Transfer(policies[:1], sweep="push@0.1s=0:2:1", lag=0.1, episodes=2, output=tmp_path).run()
+    out = capsys.readouterr().out
+    assert out.splitlines()[0].endswith("seed 1000000, with --lag 0.1")
+    assert [line.split()[0] for line in out.splitlines()[2:6]] == ["push@0.1s", "0", "1", "2"]
+    document = json.loads((tmp_path / "sweep-push-0.1s.json").read_text())
+    assert (document["parameter"], document["disturbances"]) == ("push@0.1s", "--lag 0.1")
+
+
 def test_policies_of_one_name_are_told_apart(policies, tmp_path):
     other = tmp_path / "other" / "policy-0.json"
     other.parent.mkdir()
@@ -136,6 +150,9 @@ def test_four_policies_on_six_models_take_less_than_a_minute(policies, tmp_path)
         ({"models": ["a", "b"], "sweep": "gravity=1:2:1"}, ConfigError, "one model"),
         ({"models": ["gym"], "sweep": "gravity=1:2:1"}, ConfigError, "cannot be swept"),
         ({"sweep": "gravity"}, ConfigError, "no sweep"),
+        ({"models": ["gym"], "vary": ("force=8:12",)}, ConfigError, "change nothing there"),
+        ({"sweep": "delay=0:1:0.5"}, ConfigError, "whole number"),
+        ({"models": ["cartpole"], "hold": 2.0}, ConfigError, "hold must be from 0 to 1"),
         ({"episodes": 0, "models": ["cartpole"]}, ConfigError, "episodes"),
     ],
 )

@@ -1,8 +1,11 @@
 """Plots of transfers and sweeps."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from mjcartpole.disturbances.disturbances import Disturbances
 from mjcartpole.learning.episodes import Episode
 from mjcartpole.learning.evaluation import Evaluation
 from mjcartpole.media.palette import CURVES, MISSING
@@ -87,6 +90,15 @@ def test_curves_have_a_line_and_a_band_for_each_policy():
     assert lines[0].get_ydata().tolist() == [500.0, 300.0, 10.0]
     assert len(bands) == 2
     assert axes.get_ylim() == (0, 500)
+
+
+def test_what_was_added_is_said():
+    added = Disturbances(delay=2, push="1@~4s")
+    matrix_ = replace(matrix(1.0), disturbances=added)
+    sweep_ = swept(1.0, 2.0)
+    sweep_ = replace(sweep_, played=replace(sweep_.played, disturbances=added))
+    for figure in (heat_map(matrix_), curves(sweep_)):
+        assert any("\nwith --delay 2 --push '1@~4s'" in words for words in texts(figure))
 
 
 def test_where_the_simulation_diverged_there_is_a_gap():

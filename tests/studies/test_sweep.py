@@ -1,19 +1,22 @@
 """How far a parameter may move."""
 
+import dataclasses
 import doctest
 import json
 
 import numpy as np
 import pytest
 
+from mjcartpole.disturbances.disturbances import Disturbances, WorldDisturbances
 from mjcartpole.errors import ConfigError, ModelError
 from mjcartpole.learning.discretizer import Discretizer
 from mjcartpole.learning.evaluation import evaluate
+from mjcartpole.learning.naming import added_flags
 from mjcartpole.learning.policy import Policy
 from mjcartpole.physics.edit.edits import edit_document
 from mjcartpole.physics.load import load_model
 from mjcartpole.studies import sweep as module
-from mjcartpole.studies.sweep import Stretch, SweepResult, parse_sweep, sweep
+from mjcartpole.studies.sweep import DISTURBANCES, Stretch, SweepResult, parse_sweep, sweep
 from mjcartpole.studies.transfer import Cell, TransferResult
 
 
@@ -89,6 +92,67 @@ def test_other_edits_hold_for_all_values():
     document = edit_document(load_model("cartpole").xml, {"pole.length": 0.3, "gravity": 3.0})
     alone = evaluate(POLICY["p"], model=load_model(document), episodes=5)
     assert heavy.played.cells[0].evaluation == alone
+
+
+@pytest.mark.parametrize(
+    ("key", "values", "others", "first", "second"),
+    [
+        ("delay", (0.0, 2.0), {"noise": 0.1}, {"noise": 0.1}, {"noise": 0.1, "delay": 2}),
+        ("force-noise", (1.0, 2.5), {}, {"force_noise": 1.0}, {"force_noise": 2.5}),
+        ("push@0.1s", (0.0, 1.5), {}, {}, {"push": "1.5@0.1s"}),
+        (
+            "push@~0.2s",
+            (0.25, 1.0),
+            {"push": "1@0.1s"},
+            {"push": ["1@0.1s", "0.25@~0.2s"]},
+            {"push": ["1@0.1s", "1@~0.2s"]},
+        ),
+        ("quantize", (0.0, 0.05), {"lag": 0.1}, {"lag": 0.1}, {"lag": 0.1, "quantize": 0.05}),
+    ],
+)
+def test_each_size_of_a_disturbance_is_the_evaluation_alone(key, values, others, first, second):
+    for model in ("cartpole", "gym"):
+        found = sweep(
+            POLICY, model, key, values, disturbances=Disturbances(**others), episodes=5, seed=3
+        )
+        assert (found.key, found.model) == (key.replace("-", "_"), model)
+        where = {"backend": "gym"} if model == "gym" else {}
+        for cell, given in zip(found.played.cells, (first, second), strict=True):
+            alone = evaluate(
+                POLICY["p"], disturbances=Disturbances(**given), episodes=5, seed=3, **where
+            )
+            assert cell.evaluation == alone
+        assert found.summary().get("disturbances", "") == added_flags(Disturbances(**others))
+
+
+@pytest.mark.parametrize("name", DISTURBANCES)
+def test_what_can_be_swept_is_what_can_be_added(name):
+    assert name in {field.name for field in dataclasses.fields(WorldDisturbances)}
+
+
+@pytest.mark.parametrize(
+    ("key", "values", "others", "match"),
+    [
+        ("delay", (0.0, 0.5), {}, "delay must be a whole number"),
+        ("delay", (1.0, 500.0), {}, "no shorter than an episode"),
+        ("delay", (0.0, 1.0), {"delay": 1}, "set and swept; give it once"),
+        ("drop", (0.0, 1.5), {}, "drop must be from 0 to 1"),
+        ("push", (0.0, 1.5), {}, "says when, such as push@2s=0:5:0.5"),
+        ("push@99s", (0.0, 1.5), {}, "comes after the end of every episode"),
+        ("pole.length", (1.0, 1.5), {"vary": "pole.length=1:2"}, "set and swept"),
+        ("lag", (0.0, 1.0), {"vary": "pole.length=-1:2"}, "cannot be"),
+    ],
+)
+def test_a_disturbance_that_makes_no_sense_is_refused_before_anything_is_played(
+    key, values, others, match
+):
+    with pytest.raises(ConfigError, match=match):
+        sweep(POLICY, "cartpole", key, values, disturbances=Disturbances(**others))
+
+
+def test_nothing_of_gymnasiums_own_is_edited_while_a_disturbance_is_swept():
+    with pytest.raises(ConfigError, match="cannot be swept or edited"):
+        sweep(POLICY, "gym", "delay", (0.0,), edits={"gravity": 3.0})
 
 
 def result_with(*means, values=None):

@@ -6,6 +6,7 @@ import math
 import numpy as np
 import pytest
 
+from mjcartpole.disturbances.disturbances import Disturbances
 from mjcartpole.errors import ConfigError, ModelError, ModelNotFoundError
 from mjcartpole.learning.discretizer import Discretizer
 from mjcartpole.learning.evaluation import evaluate
@@ -70,6 +71,32 @@ def test_the_summary_is_plain(matrix):
     assert first["episodes"] == 20
     assert first["low"] <= first["mean"] <= first["high"]
     assert first["time limit"] + first["off the track"] + first["pole fell"] == 20
+
+
+def test_disturbances_are_added_everywhere_but_gymnasiums_model_does_not_vary():
+    some = {"delay": 1, "noise": 0.05}
+    varied = Disturbances(**some, vary="pole.length=0.5:2", pool=3)
+    found = transfer(POLICIES, ["gym", "cartpole"], disturbances=varied, episodes=5, seed=3)
+    for cell in found.cells:
+        where = {"backend": "gym"} if cell.place == "gym" else {"model": cell.place}
+        added = Disturbances(**some) if cell.place == "gym" else varied
+        alone = evaluate(POLICIES[cell.policy], disturbances=added, episodes=5, seed=3, **where)
+        assert cell.evaluation == alone
+    said = "--vary pole.length=0.5:2 --delay 1 --noise 0.05 --pool 3"
+    assert found.summary()["disturbances"] == said
+
+
+@pytest.mark.parametrize(
+    ("added", "match"),
+    [
+        ({"delay": 500}, "no shorter than an episode"),
+        ({"noise": (1, 1, 1, 1, 1, 1)}, "6 numbers for what is seen"),
+        ({"vary": "pole.length=-1:1"}, r"vary 'pole.length=-1:1' cannot be"),
+    ],
+)
+def test_disturbances_that_make_no_sense_are_refused_before_anything_is_played(added, match):
+    with pytest.raises(ConfigError, match=match):
+        transfer(POLICIES, ["cartpole"], disturbances=Disturbances(**added))
 
 
 def test_edits_make_a_place():

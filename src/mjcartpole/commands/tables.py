@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mjcartpole.commands.options import FAILED
+from mjcartpole.commands.printing import with_added
 from mjcartpole.files import (
     check_free,
     check_writable,
@@ -45,7 +46,8 @@ def free_table(output: Path | None, name: str, overwrite: bool) -> Path:
 
 def print_matrix(result: TransferResult) -> None:
     """Print one line per model, one column per policy."""
-    print(f"mean greedy return and 95 % interval, seed {result.seed}\n")
+    added = with_added(result.disturbances)
+    print(f"mean greedy return and 95 % interval, seed {result.seed}{added}\n")
     first = max(len(name) for name in result.places)
     labels = [f"{place:{first}}" for place in result.places]
     _print_grid(" " * first, labels, result)
@@ -53,7 +55,8 @@ def print_matrix(result: TransferResult) -> None:
 
 def print_sweep(result: SweepResult) -> None:
     """Print one line per value, one column per policy; then where each policy holds."""
-    print(f"mean greedy return on {result.model}, seed {result.played.seed}\n")
+    added = with_added(result.played.disturbances)
+    print(f"mean greedy return on {result.model}, seed {result.played.seed}{added}\n")
     first = max(10, len(result.key))
     labels = [f"{value:{first}g}" for value in result.values]
     _print_grid(f"{result.key:>{first}}", labels, result.played)

@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mjcartpole.commands.options import Command, OutputPath, Policies
+from mjcartpole.disturbances.changes import DisturbanceChanges
+from mjcartpole.disturbances.disturbances import NONE
 from mjcartpole.errors import ConfigError
 from mjcartpole.integrator import Integrator
 from mjcartpole.learning.evaluation import EPISODES, SEED, Player
@@ -24,7 +26,7 @@ PolicyGroups = Mapping[str, Sequence[Player]]
 
 
 @dataclass(frozen=True)
-class Transfer(RuleChanges, Command):
+class Transfer(RuleChanges, DisturbanceChanges, Command):
     """Play policies on models they were not trained on; or see how far a number can move."""
 
     sources: Policies = ()
@@ -36,7 +38,8 @@ class Transfer(RuleChanges, Command):
     set: tuple[str, ...] = ()
     """Edits of every model, such as pole.length=1.5 or joint:hinge.damping=0.1; gym has none."""
     sweep: str | None = None
-    """An edit over a range, such as pole.length=0.5:3:0.25, on one model."""
+    """An edit over a range, such as pole.length=0.5:3:0.25, on one model; or a disturbance, such as
+    delay=0:10:1, noise=0:0.1:0.01 or push@2s=0:5:0.5."""
     integrator: Integrator = "gym"
     """gym: explicit Euler, as CartPole-v1; mujoco: the integrator that the model's file names."""
     own_timestep: bool = False
@@ -69,11 +72,13 @@ class Transfer(RuleChanges, Command):
         from mjcartpole.studies.transfer import GYM, find_place, transfer
 
         chosen = dict.fromkeys(self.models or _fitting(policies))
-        if set(chosen) == {GYM} and (self.set or self.own_timestep):
+        if set(chosen) == {GYM} and (self.set or self.own_timestep or self.vary):
             raise ConfigError(
-                "gym is gymnasium's own cart-pole: --set and --own-timestep change nothing there"
+                "gym is gymnasium's own cart-pole: --set, --own-timestep and --vary change nothing "
+                "there"
             )
-        places = [find_place(model, self.set, **self._physics) for model in chosen]
+        physics = {**self._physics, "disturbances": self.added_to(NONE)}
+        places = [find_place(model, self.set, **physics) for model in chosen]
         target = tables.free_table(self.output, "transfer", self.overwrite)
         matrix = transfer(policies, places, **self._play)
         tables.print_matrix(matrix)
@@ -115,7 +120,7 @@ class Transfer(RuleChanges, Command):
     @property
     def _play(self) -> dict[str, Any]:
         settings = {"episodes": self.episodes, "seed": self.seed, "workers": self.workers}
-        return {"task": self._task(), **settings}
+        return {"task": self._task(), "disturbances": self.added_to(NONE), **settings}
 
     def _task(self) -> "Task":
         """Return by whose rules is played: those asked for, or all that the policies know."""

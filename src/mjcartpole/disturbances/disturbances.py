@@ -158,6 +158,11 @@ class Disturbances(WorldDisturbances):
         return dataclasses.replace(self, observe_actions=actions)
 
     @property
+    def fixed(self) -> Self:
+        """The same where nothing varies."""
+        return dataclasses.replace(self, vary=(), pool=None, widen=0, observe_context=False)
+
+    @property
     def blur_sensors(self) -> bool:
         """Whether what is seen may lie outside the task's own bounds."""
         return any(map(any, (self.noise, self.bias, self.quantize)))

@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mjcartpole.learning.naming import added_flags
 from mjcartpole.media.palette import MISSING, PAPER
 from mjcartpole.media.plots import css, ink_on, level, plain, plot_style, short
 from mjcartpole.studies.sweep import SweepResult
@@ -46,7 +47,9 @@ def heat_map(result: TransferResult) -> "Figure":
     axes.tick_params(which="both", length=0, labeltop=True, labelbottom=False)
     axes.spines[:].set_visible(False)
     episodes = max(len(cell.evaluation.episodes) if cell.evaluation else 0 for cell in result.cells)
-    axes.set_xlabel(f"mean greedy return of {episodes} episodes\nbelow: 95 % interval")
+    axes.set_xlabel(
+        f"mean greedy return of {episodes} episodes\nbelow: 95 % interval{_added(result)}"
+    )
     return figure
 
 
@@ -68,7 +71,8 @@ def curves(result: SweepResult) -> "Figure":
         bands = [cell.interval or (np.nan, np.nan) for cell in cells]
         axes.fill_between(result.values, *np.transpose(bands), alpha=0.2, linewidth=0)
         axes.plot(result.values, [cell.mean for cell in cells], "o-", markersize=5, clip_on=False)
-    axes.set(xlabel=plain(result.key), title=f"mean greedy return on {short(result.model, 50)}")
+    title = f"mean greedy return on {short(result.model, 50)}{_added(result.played)}"
+    axes.set(xlabel=plain(result.key), title=title)
     axes.set_ylim(*result.played.task.return_span)
     axes.margins(x=0)
     if result.threshold is not None:
@@ -78,6 +82,12 @@ def curves(result: SweepResult) -> "Figure":
         # Set here: a label that begins with an underscore would be left out.
         text.set_text(short(name) + _in_words(result, name))
     return figure
+
+
+def _added(result: TransferResult) -> str:
+    """Return a line for what was added at all places; nothing where nothing was."""
+    flags = added_flags(result.disturbances)
+    return f"\nwith {short(flags, 60)}" if flags else ""
 
 
 def _in_words(result: SweepResult, policy: str) -> str:

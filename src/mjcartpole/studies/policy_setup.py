@@ -150,9 +150,7 @@ def _placed(
 def _disturbances(config: TrainConfig, target: EvalTarget, backend: Backend) -> Disturbances:
     """Return what is added: the run's own, but for what is asked for."""
     own = NONE if target.undisturbed else config.disturbances_after
-    if backend == "gym":
-        own = dataclasses.replace(own, vary=(), pool=None)
-    return target.added_to(own)
+    return target.added_to(own.fixed if backend == "gym" else own)
 
 
 def _read(source: Path, target: EvalTarget) -> tuple[str, Policy, TrainConfig, runs.Run | None]:

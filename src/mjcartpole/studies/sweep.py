@@ -1,14 +1,16 @@
 """How far may a parameter move before a policy fails?"""
 
+import functools
 import itertools
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Container, Mapping, Sequence
+from dataclasses import dataclass, replace
 from decimal import Decimal, InvalidOperation
 from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
+from mjcartpole.disturbances.disturbances import NONE, Disturbances
 from mjcartpole.errors import ConfigError
 from mjcartpole.integrator import Integrator
 from mjcartpole.learning.evaluation import EPISODES, SEED, Player, check_count
@@ -18,6 +20,13 @@ from mjcartpole.studies.transfer import GYM, Cell, TransferResult, find_place, t
 from mjcartpole.task import CARTPOLE_V1, Task
 
 MOST_VALUES: Final = 1_000
+
+COUNTS: Final = ("delay", "sensor_delay")
+DISTURBANCES: Final = (
+    *COUNTS,
+    *("hold", "drop", "lag", "force_noise", "push", "noise", "bias", "quantize"),
+)
+"""What can be swept beside edits."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +56,7 @@ class SweepResult:
     """Every policy at every value of one parameter.
 
     Attributes:
-        key: What was changed, as `edit_document` knows it.
+        key: What was changed: an edit, as `edit_document` knows it, or a disturbance.
         values: Rising.
         model: Name of the model that was edited.
         played: Every policy (row) at every value (column).
@@ -102,7 +111,7 @@ class SweepResult:
             "parameter": self.key,
             "values": list(self.values),
             "model": self.model,
-            "seed": self.played.seed,
+            **self.played.common,
             "threshold": self.threshold,
             "holds": {name: self._spans(name) for name in self.played.policies},
             "points": points,
@@ -155,21 +164,24 @@ def sweep(
     integrator: Integrator = "gym",
     own_timestep: bool = False,
     task: Task | str = CARTPOLE_V1,
+    disturbances: Disturbances = NONE,
     episodes: int = EPISODES,
     seed: int = SEED,
     workers: int | None = None,
 ) -> SweepResult:
-    """Play every policy on a model at each value of one of its parameters.
+    """Play every policy on a model at each value of one of its parameters, or of a disturbance.
 
     Args:
         policies: By name; see `transfer`.
-        model: What is edited; see `load_model`.
-        key: What is changed; see `edit_document`.
+        model: What is edited; see `load_model`. Disturbances may also be those of "gym".
+        key: What is changed: an edit, see `edit_document`; or one of `DISTURBANCES`, or shoves at
+            a time, such as push@2s.
         values: Rising.
         edits: What else is changed, at all values; see `load_model`.
         integrator: See `Simulation`.
         own_timestep: See `load_model`.
         task: The rules, or their name.
+        disturbances: What is added besides, at all values.
         episodes: Greedy episodes for each policy and value.
         seed: Seeds the starting states and the bootstrap.
         workers: How many at once; as many as there are cores if left out.
@@ -180,23 +192,53 @@ def sweep(
         ModelError: The model cannot be used, or a value makes it one that cannot.
     """
     check_count(episodes, seed)
-    others = edits_of(edits or ())
-    _check(model, key, values, others)
-    base = load_model(model, own_timestep=True)
-    places = [
-        find_place(base, {**others, key: value}, integrator, own_timestep=own_timestep)
-        for value in values
-    ]
-    played = transfer(policies, places, task=task, episodes=episodes, seed=seed, workers=workers)
-    return SweepResult(key, tuple(map(float, values)), base.name, played)
+    others, word = edits_of(edits or ()), key.replace("-", "_")
+    is_disturbance = word.partition("@")[0] in DISTURBANCES
+    if model == GYM and (others or own_timestep or not is_disturbance):
+        raise ConfigError(
+            "gymnasium's CartPole-v1 cannot be swept or edited, but for disturbances; give a "
+            "model, as 'cartpole'"
+        )
+    varying = [each.name for each in disturbances.ranges]
+    key = word if is_disturbance else key
+    _check(key, values, {*others, *disturbances.given, *varying})
+    find = functools.partial(
+        find_place, integrator=integrator, own_timestep=own_timestep, disturbances=disturbances
+    )
+    if is_disturbance:
+        place = find(model, others)
+        swept = [_disturbed(place.disturbances, key, value) for value in values]
+        name, places = place.name, [replace(place, disturbances=each) for each in swept]
+    else:
+        base = load_model(model, own_timestep=True)
+        name, places = base.name, [find(base, {**others, key: value}) for value in values]
+    played = transfer(
+        policies,
+        places,
+        task=task,
+        disturbances=disturbances,
+        episodes=episodes,
+        seed=seed,
+        workers=workers,
+    )
+    return SweepResult(key, tuple(map(float, values)), name, played)
 
 
-def _check(
-    model: ModelLike, key: str, values: Sequence[float], edits: Mapping[str, object]
-) -> None:
-    if model == GYM:
-        raise ConfigError("gymnasium's CartPole-v1 cannot be swept; give a model, as 'cartpole'")
-    if key in edits:
+def _disturbed(others: Disturbances, key: str, value: float) -> Disturbances:
+    """Return disturbances with one more, of a size."""
+    name, _, when = key.partition("@")
+    if name == "push":
+        if not when:
+            raise ConfigError("a sweep of shoves says when, such as push@2s=0:5:0.5 or push@~4s=…")
+        return replace(others, push=(*others.push, f"{value}@{when}") if value else others.push)
+    changes: dict[str, Any] = {name: value}
+    if name in COUNTS and float(value).is_integer():
+        changes[name] = int(value)
+    return replace(others, **changes)
+
+
+def _check(key: str, values: Sequence[float], given: Container[str]) -> None:
+    if key in given:
         raise ConfigError(f"'{key}' is set and swept; give it once")
     if not values or any(a >= b for a, b in itertools.pairwise(values)):
         raise ConfigError(f"a sweep needs rising values, not {list(values)}")

@@ -9,14 +9,17 @@ import numpy as np
 import numpy.typing as npt
 
 from mjcartpole.cores import worker_count
+from mjcartpole.disturbances.disturbances import NONE, Disturbances
 from mjcartpole.envs.backend import Backend
 from mjcartpole.errors import ConfigError, MjCartPoleError
 from mjcartpole.integrator import Integrator
 from mjcartpole.learning.evaluation import EPISODES, SEED, Evaluation, Player, check_count, evaluate
+from mjcartpole.learning.naming import added_flags
 from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.load import Edits, ModelLike, load_model
+from mjcartpole.physics.variants import contexts_of
 from mjcartpole.studies.statistics import Interval, bootstrap_interval
-from mjcartpole.task import CARTPOLE_V1, Task, resolve
+from mjcartpole.task import CARTPOLE_V1, CONTROL_STEP, Task, resolve
 
 GYM: Final = "gym"
 """The place that is gymnasium's own CartPole-v1, instead of a model."""
@@ -30,11 +33,13 @@ class Place:
         name: What a person calls it.
         cartpole: What moves; None for gymnasium's CartPole-v1.
         integrator: See `Simulation`.
+        disturbances: What is added.
     """
 
     name: str
     cartpole: CartPole | None
     integrator: Integrator = "gym"
+    disturbances: Disturbances = NONE
 
     @property
     def backend(self) -> Backend:
@@ -45,6 +50,17 @@ class Place:
     def poles(self) -> int:
         """How many there are."""
         return 1 if self.cartpole is None else self.cartpole.poles
+
+    def check_disturbances(self, task: Task) -> None:
+        """Refuse disturbances that make no sense here by these rules.
+
+        Raises:
+            ConfigError: See above.
+        """
+        step = self.cartpole.control_step if self.cartpole else CONTROL_STEP
+        self.disturbances.effects(self.poles, step, task)
+        if self.cartpole and self.disturbances.vary:
+            contexts_of(self.cartpole, self.disturbances)
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,6 +114,7 @@ class TransferResult:
         cells: Row by row.
         seed: Of the starting states, which are the same in every cell.
         task: By whose rules they were played.
+        disturbances: What was added everywhere; gymnasium's own model does not vary.
     """
 
     policies: tuple[str, ...]
@@ -105,6 +122,7 @@ class TransferResult:
     cells: tuple[Cell, ...]
     seed: int
     task: Task = CARTPOLE_V1
+    disturbances: Disturbances = NONE
 
     def __repr__(self) -> str:
         counts = f"policies: {len(self.policies)}, models: {len(self.places)}"
@@ -126,12 +144,18 @@ class TransferResult:
         """The cells whose episodes could not be played."""
         return [cell for cell in self.cells if cell.error]
 
+    @property
+    def common(self) -> dict[str, Any]:
+        """What all cells have in common, as plain values."""
+        added = added_flags(self.disturbances)
+        return {"seed": self.seed, **({"disturbances": added} if added else {})}
+
     def summary(self) -> dict[str, Any]:
         """Everything as plain values, for JSON."""
         return {
             "policies": list(self.policies),
             "models": list(self.places),
-            "seed": self.seed,
+            **self.common,
             "cells": [cell.summary() for cell in self.cells],
         }
 
@@ -142,6 +166,7 @@ def find_place(
     integrator: Integrator = "gym",
     *,
     own_timestep: bool = False,
+    disturbances: Disturbances = NONE,
 ) -> Place:
     """A model as a place, with some things in it changed; `"gym"` is gymnasium's CartPole-v1.
 
@@ -150,15 +175,16 @@ def find_place(
         edits: See `load_model`.
         integrator: See `Simulation`; gymnasium's keeps its own.
         own_timestep: See `load_model`; gymnasium's keeps its own.
+        disturbances: What is added; gymnasium's model does not vary.
 
     Raises:
         ModelError: The model cannot be used; the message names it.
         ConfigError: An edit names nothing that is there, or a value is outside physics.
     """
     if model == GYM:
-        return Place(GYM, None)
+        return Place(GYM, None, disturbances=disturbances.fixed)
     cartpole = load_model(model, edits, own_timestep=own_timestep)
-    return Place(cartpole.name, cartpole, integrator)
+    return Place(cartpole.name, cartpole, integrator, disturbances)
 
 
 def transfer(
@@ -166,6 +192,7 @@ def transfer(
     places: Sequence[Place | ModelLike],
     *,
     task: Task | str = CARTPOLE_V1,
+    disturbances: Disturbances = NONE,
     episodes: int = EPISODES,
     seed: int = SEED,
     workers: int | None = None,
@@ -179,19 +206,23 @@ def transfer(
         policies: By name; several under one name are one learner's, from several seeds.
         places: Places, or what `find_place` takes.
         task: The rules, or their name.
+        disturbances: What is added; a `Place` has its own.
         episodes: Greedy episodes per cell.
         seed: Seeds the starting states and the bootstrap.
         workers: How many cells at once; as many as there are cores if left out.
 
     Raises:
-        ConfigError: There is no policy or place, a number makes no sense, or a policy is one for
-            another number of poles.
+        ConfigError: There is no policy or place, a number or a disturbance makes no sense, or a
+            policy is one for another number of poles.
         ModelError: A model cannot be used; nothing has been played then.
     """
     check_count(episodes, seed)
     if not policies or not places:
         raise ConfigError("a transfer needs one policy and one model at least")
-    found = [place if isinstance(place, Place) else find_place(place) for place in places]
+    found = [
+        place if isinstance(place, Place) else find_place(place, disturbances=disturbances)
+        for place in places
+    ]
     groups = {
         name: tuple(group) if isinstance(group, Sequence) else (group,)
         for name, group in policies.items()
@@ -201,6 +232,8 @@ def transfer(
         for policy in groups[name]:
             policy.check_fits(place.poles, place.name)
     rules, count = resolve(task), worker_count(workers, len(pairs))
+    for place in found:
+        place.check_disturbances(rules)
     # Threads: the compiled engine leaves Python's lock alone.
     with concurrent.futures.ThreadPoolExecutor(count) as pool:
         futures = [
@@ -213,7 +246,7 @@ def transfer(
             pool.shutdown(wait=False, cancel_futures=True)
             raise
     names = tuple(place.name for place in found)
-    return TransferResult(tuple(policies), names, cells, seed, rules)
+    return TransferResult(tuple(policies), names, cells, seed, rules, disturbances)
 
 
 def _play(
@@ -227,6 +260,7 @@ def _play(
                 model=place.cartpole or "cartpole",
                 integrator=place.integrator,
                 task=rules,
+                disturbances=place.disturbances,
                 episodes=episodes,
                 seed=seed,
             )
