@@ -14,6 +14,7 @@ accelerations that a push makes. `Linear` knows no physics: a state changes by a
 `(x_dot, theta, theta_dot, u)`. Both are odd, as the world is where left and right are alike.
 """
 
+import math
 from typing import Any, Final, NamedTuple, TypeAlias
 
 import numpy as np
@@ -29,6 +30,9 @@ diverged, and far beyond any limit."""
 
 MOST_COUPLED: Final = 0.99
 """Of coupling times leverage, which is below 1 for any masses: where noise says otherwise."""
+
+LEAST_MISSED: Final = 1e-300
+"""Of a sum of squares: a fit may be exact."""
 
 
 class Seen(NamedTuple):
@@ -131,19 +135,34 @@ def fit_rod(seen: Seen, h: float) -> Rod:
 def fit_linear(seen: Seen) -> Linear:
     """Return the linear model that steps fit best, as it is at theta = 0.
 
-    How much a push moves may change with the square of the angle, which is fitted beside the model:
-    else x_dot and theta_dot, almost multiples of each other after random pushes, are blamed for it.
+    What is of third order is fitted beside it, and left out: else x_dot and theta_dot, almost
+    multiples of each other after random pushes, are blamed for it.
     """
     _, x_dot, theta, theta_dot = seen.before.T
     u = 2.0 * seen.actions - 1.0
-    columns = x_dot, theta, theta_dot, u, u * theta**2
+    columns = x_dot, theta, theta_dot, u, u * theta**2, theta**3, theta * theta_dot**2
     a, b, c, d = (_row(columns, change) for change in (seen.after - seen.before).T)
     return Linear(a, b, c, d)
 
 
 def _row(columns: tuple[Any, ...], target: Vector) -> Row:
-    a, b, c, d, _ = _solve(columns, target)
+    """Return the weights of the first four columns, fitted beside one or all of the others."""
+    few = columns[:5]
+    chosen = columns if _criterion(columns, target) < _criterion(few, target) else few
+    a, b, c, d, *_ = _solve(chosen, target)
     return a, b, c, d
+
+
+def _criterion(columns: tuple[Any, ...], target: Vector) -> float:
+    """Return Akaike's criterion of a fit, per step: more columns have to be worth their noise.
+
+    Corrected for few steps (Hurvich and Tsai, 1989, doi:10.1093/biomet/76.2.297).
+    """
+    spare = len(target) - len(columns) - 1
+    if spare <= 0:
+        return math.inf
+    missed = target - np.stack(columns, axis=1) @ _solve(columns, target)
+    return math.log(max(float(missed @ missed), LEAST_MISSED)) + 2 * len(columns) / spare
 
 
 def _solve(columns: tuple[Any, ...], target: Vector) -> list[float]:

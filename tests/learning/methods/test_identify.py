@@ -126,7 +126,7 @@ class Own:
 
     def episode(self, number):
         share = min(1.0, number / (0.8 * self.c.episodes))
-        epsilon, alpha = 1 + share * (0.01 - 1), 0.1 + share * (0.01 - 0.1)
+        epsilon, alpha = 1 - share, 0.1 + share * (0.01 - 0.1)
         s, path = self.starts.uniform(-0.05, 0.05, 4).tolist(), []
         while abs(s[0]) <= 2.4 and abs(s[2]) <= math.radians(12) and len(path) < 500:
             row, mirrored = self.row(s)
@@ -138,7 +138,7 @@ class Own:
             s = self.move(s, 1 if action != mirrored else -1)
         future = self.q[self.row(s)[0]].max() if len(path) == 500 else 0.0
         for row, action in reversed(path):
-            target = 1 + 0.98 * future
+            target = 1 + 0.99 * future
             self.q[row, action] += alpha * (target - self.q[row, action])
             future = 0.1 * self.q[row].max() + 0.9 * target
         return len(path)

@@ -42,6 +42,12 @@ class Parameters(q_learning.Parameters):
 
     episode: ClassVar[str] = "dreamt episode"
 
+    # Nothing is random in a dream but what explores: the far future can be told, and last
+    # episodes that are greedy show a cart that rolls away where exploring steps would stop it.
+    gamma: float = 0.99
+    """Discount per step."""
+    epsilon_final: float = 0.0
+    """Probability of a random action once decayed."""
     fit: Fit = "rod"
     """The model that is fitted: the equations of a cart with a rod, or a linear one."""
     fit_steps: int | None = None
