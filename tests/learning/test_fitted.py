@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mjcartpole.learning import linking
+from mjcartpole.learning import stepping
 from mjcartpole.learning.fitted import (
     FASTEST,
     Linear,
@@ -182,7 +182,7 @@ def test_no_model_leaves_what_physics_call_sane(action):
 )
 def test_a_compiled_step_has_the_same_bits(advance, model):
     rng = np.random.default_rng(5)
-    fast = linking.compiled(advance)
+    fast = getattr(stepping, f"_{advance.__name__}")
     for state in rng.normal(scale=[1, 1, 0.2, 1], size=(200, 4)).tolist():
         action = int(rng.integers(2))
         expected = [float(x).hex() for x in advance(model, tuple(state), action)]
