@@ -59,7 +59,7 @@ def lasting(record):
 def test_a_run_that_travelled_comes_to_the_same(base):
     run = first_run(episodes=8, **base)
     parcel = pickle.loads(pickle.dumps(Parcel.of(run)))
-    here = do_run(run.key, run.job, lambda: False)
+    here = do_run(run.key, run.job, None, lambda: False)
     assert lasting(run_parcel(parcel)) == lasting(here)
 
 
@@ -67,7 +67,7 @@ def test_files_that_a_model_names_travel_with_it(tmp_path):
     (tmp_path / "m.obj").write_bytes(OBJ)
     (tmp_path / "mine.xml").write_text(document(asset=MESH.format("m.obj")))
     run = first_run(episodes=4, model=str(tmp_path / "mine.xml"))
-    here, parcel = do_run(run.key, run.job, lambda: False), Parcel.of(run)
+    here, parcel = do_run(run.key, run.job, None, lambda: False), Parcel.of(run)
     assert list(parcel.files.values()) == [OBJ]
     shutil.rmtree(tmp_path)
     assert not here.error and lasting(run_parcel(parcel)) == lasting(here)

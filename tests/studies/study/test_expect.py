@@ -16,7 +16,7 @@ def runs_of(**study):
 
 def test_trainings_that_can_be_tried_whole_are_expected_as_they_are():
     runs = runs_of(seeds=1, measure=["area_under_curve"])
-    steps = sum(do_run(run.key, run.job, lambda: False).steps_trained for run in runs)
+    steps = sum(do_run(run.key, run.job, None, lambda: False).steps_trained for run in runs)
     found = expect(runs, tried=3)
     assert found.steps == steps and found.seconds > 0
 

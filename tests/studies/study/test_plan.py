@@ -79,3 +79,16 @@ def test_to_say_when_it_was_solved_a_training_is_evaluated():
 def test_too_many_runs_are_refused():
     with pytest.raises(ConfigError, match="2,000 points with 1,000 seeds"):
         planned({"alpha": {"low": 0, "high": 1}}, design="random", samples=2000, seeds=1000)
+
+
+def test_under_what_policies_are_tested_is_part_of_a_key():
+    def tested(**disturbances):
+        about = {"seeds": 1, "measure": ["robust_mean"]}
+        values = {"study": about, "robustness": disturbances, "factors": {"alpha": [0.1]}}
+        return plan(study_of(values)).runs[0]
+
+    assert (
+        len({tested(noise=0.1).key, tested(noise=0.2).key, *keys({"alpha": [0.1]}, seeds=1)}) == 3
+    )
+    assert tested(noise=0.1).tested.noise == (0.1,)
+    assert tested(noise=0.1).key == tested(noise=[0.1]).key

@@ -4,6 +4,7 @@ import dataclasses
 
 import pytest
 
+from mjcartpole.disturbances.disturbances import Disturbances
 from mjcartpole.errors import FileError
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.evaluation import evaluate
@@ -16,7 +17,7 @@ CONFIG = TrainConfig(backend="gym", episodes=120, evaluate_every=40)
 
 @pytest.fixture(scope="module")
 def record():
-    return do_run("k1", SeedJob(CONFIG, "compiled", None), lambda: False)
+    return do_run("k1", SeedJob(CONFIG, "compiled", None), None, lambda: False)
 
 
 def test_a_record_says_what_the_training_says(record):
@@ -27,6 +28,8 @@ def test_a_record_says_what_the_training_says(record):
         "greedy_minimum": played.minimum,
         "episodes_to_solve": alone.solved and alone.solved.episodes,
         "steps_to_solve": alone.solved and alone.solved.steps,
+        "robust_mean": None,
+        "robust_minimum": None,
         "area_under_curve": pytest.approx(alone.returns.mean()),
     }
     assert (record.episodes_trained, record.steps_trained) == (120, alone.steps)
@@ -42,19 +45,19 @@ def test_what_is_not_asked_is_not_played():
     quick = SeedJob(
         dataclasses.replace(CONFIG, evaluate_every=None), "compiled", None, evaluated=False
     )
-    found = do_run("k1", quick, lambda: False)
+    found = do_run("k1", quick, None, lambda: False)
     assert found.figures["greedy_mean"] is None
     assert not found.has(["greedy_mean"]) and found.has(["area_under_curve"])
 
 
 def test_a_run_that_is_to_stop_leaves_nothing():
-    assert do_run("k1", SeedJob(CONFIG, "compiled", None), lambda: True) is None
+    assert do_run("k1", SeedJob(CONFIG, "compiled", None), None, lambda: True) is None
 
 
 def test_a_run_that_fails_says_why():
-    found = do_run("k1", SeedJob(CONFIG, "compiled", "<mujoco/>"), lambda: False)
+    found = do_run("k1", SeedJob(CONFIG, "compiled", "<mujoco/>"), None, lambda: False)
     job = SeedJob(dataclasses.replace(CONFIG, backend="mujoco"), "compiled", "<mujoco/>")
-    found = do_run("k1", job, lambda: False)
+    found = do_run("k1", job, None, lambda: False)
     assert "cartpole" in found.error and found.has(["greedy_mean"])
     assert Record.read(found.line()).error == found.error
 
@@ -98,3 +101,13 @@ def test_a_log_that_is_none_is_refused(tmp_path):
     (tmp_path / LOG).mkdir()
     with pytest.raises(FileError, match="a folder where a plain file is needed"):
         RecordLog(tmp_path)
+
+
+def test_policies_are_tested_under_other_disturbances(record):
+    tested = Disturbances(noise=0.3, delay=3)
+    found = do_run("k1", SeedJob(CONFIG, "compiled", None), tested, lambda: False)
+    played = evaluate(train(CONFIG).policy, backend="gym", disturbances=tested)
+    assert found.figures["robust_mean"] == played.mean < record.figures["greedy_mean"]
+    assert found.figures["robust_minimum"] == played.minimum
+    assert record.figures["robust_mean"] is None
+    assert found.figures["greedy_mean"] == record.figures["greedy_mean"]

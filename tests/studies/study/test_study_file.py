@@ -77,6 +77,12 @@ def test_a_file_means_what_it_says(tmp_path):
         ("[study]\nsamples = 9\n[factors]\nalpha = [1]", "a grid has all combinations"),
         ("[study]\nbaseline = {alpha = 0.3}\n[factors]\nalpha = [1]", "0.3 is none of the levels"),
         ("[study]\nbaseline = {gamma = 0.3}\n[factors]\nalpha = [1]", "none of the factors"),
+        ("[robustness]\nnoise = 0.1\n[factors]\nalpha = [1]", "belong together"),
+        ("[study]\nmeasure = ['robust_mean']\n[factors]\nalpha = [1]", "belong together"),
+        (
+            "[study]\nmeasure = 'robust_mean'\n[robustness]\nnosie = 1\n[factors]\nalpha = [1]",
+            "did you mean 'noise'?",
+        ),
         ("[factor]\nalpha = [1]\n[factors]\nalpha = [1]", "[factor] is no part of a study"),
         ("study = 3\n[factors]\nalpha = [1]", "study must be a table"),
     ],

@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import mjcartpole
+from mjcartpole.disturbances.disturbances import Disturbances
 from mjcartpole.errors import ConfigError, MjCartPoleError
 from mjcartpole.files import brief, read_bytes
 from mjcartpole.physics.cartpole import CartPole
@@ -38,7 +39,8 @@ _AHEAD: Final = 3
 """Runs that are sent for each thread of a worker: none waits for this machine."""
 _MOST_FILE: Final = 2**28
 """Bytes of a file that a model names."""
-_DECIDING: Final = ("task.py", "physics/**/*.py", "envs/**/*.py", "learning/**/*.py")
+_FOLDERS: Final = ("disturbances", "physics", "envs", "learning")
+_DECIDING: Final = ("*.py", *(f"{name}/**/*.py" for name in _FOLDERS))
 """What of this package decides the bits of a training."""
 
 _ADDRESS: Final = re.compile(r"(\w+://)?[^\s/]+:\d{1,5}")
@@ -58,12 +60,14 @@ class Parcel:
         key: See `PlannedRun`.
         job: With the document as a run stores it.
         files: What lies beside it, by name.
+        tested: See `PlannedRun`.
         versions: Those here: a worker of others would find other figures.
     """
 
     key: str
     job: SeedJob
     files: Mapping[str, bytes] = field(repr=False)
+    tested: Disturbances | None
     versions: Mapping[str, str]
 
     @classmethod
@@ -74,11 +78,11 @@ class Parcel:
             FileError: A file that its model names cannot be read.
         """
         if run.job.document is None:
-            return cls(run.key, run.job, {}, versions_here())
+            return cls(run.key, run.job, {}, run.tested, versions_here())
         document, files = run.cartpole.stored
         contents = {name: _content(source) for name, source in files.items()}
         job = dataclasses.replace(run.job, document=document)
-        return cls(run.key, job, contents, versions_here())
+        return cls(run.key, job, contents, run.tested, versions_here())
 
 
 def run_parcel(parcel: Parcel) -> Record | None:
@@ -92,7 +96,7 @@ def run_parcel(parcel: Parcel) -> Record | None:
         for name, content in parcel.files.items():
             Path(folder, name).write_bytes(content)
         cartpole = _unpacked(parcel.job, Path(folder)) if parcel.files else None
-        return do_run(parcel.key, parcel.job, lambda: False, cartpole)
+        return do_run(parcel.key, parcel.job, parcel.tested, lambda: False, cartpole)
 
 
 @functools.cache

@@ -7,8 +7,8 @@ from typing import Any, Final
 import numpy as np
 
 from mjcartpole.learning.config import TrainConfig
+from mjcartpole.learning.evaluation import Evaluation
 from mjcartpole.learning.training import TrainResult
-from mjcartpole.studies.seeds import SeedResult
 
 STRETCHES: Final = 50
 """Points of a learning curve."""
@@ -17,18 +17,33 @@ EVALUATIONS: Final = 20
 
 
 @dataclass(frozen=True)
+class Outcome:
+    """What a training came to.
+
+    Attributes:
+        result: What was learned.
+        greedy: Greedy episodes afterwards; None where none are asked for.
+        disturbed: Greedy episodes under the disturbances of [robustness]; None likewise.
+    """
+
+    result: TrainResult
+    greedy: Evaluation | None = None
+    disturbed: Evaluation | None = None
+
+
+@dataclass(frozen=True)
 class Measure:
     """A figure of a training.
 
     Attributes:
         text: What it is.
-        of: The figure of a training and its evaluation; None where it has none.
+        of: The figure of what a training came to; None where it has none.
         more_is_better: Whether a larger one is better.
         budget: Of a training that never came to it, what it spent in vain.
     """
 
     text: str
-    of: Callable[[SeedResult, TrainResult], float | None]
+    of: Callable[["Outcome"], float | None]
     more_is_better: bool = True
     budget: str = ""
 
@@ -36,31 +51,39 @@ class Measure:
 MEASURES: Final[dict[str, Measure]] = {
     "greedy_mean": Measure(
         "mean return of 100 greedy episodes after the training",
-        lambda seed, _: None if seed.evaluation is None else seed.evaluation.mean,
+        lambda its: its.greedy.mean if its.greedy else None,
     ),
     "greedy_minimum": Measure(
         "the least return of these",
-        lambda seed, _: None if seed.evaluation is None else seed.evaluation.minimum,
+        lambda its: its.greedy.minimum if its.greedy else None,
+    ),
+    "robust_mean": Measure(
+        "mean return of 100 greedy episodes under the disturbances of [robustness]",
+        lambda its: its.disturbed.mean if its.disturbed else None,
+    ),
+    "robust_minimum": Measure(
+        "the least return of these",
+        lambda its: its.disturbed.minimum if its.disturbed else None,
     ),
     "episodes_to_solve": Measure(
         "training episodes until a greedy evaluation in its midst was solved",
-        lambda _, result: result.solved and result.solved.episodes,
+        lambda its: its.result.solved and its.result.solved.episodes,
         more_is_better=False,
         budget="episodes_trained",
     ),
     "steps_to_solve": Measure(
         "the steps of these",
-        lambda _, result: result.solved and result.solved.steps,
+        lambda its: its.result.solved and its.result.solved.steps,
         more_is_better=False,
         budget="steps_trained",
     ),
     "area_under_curve": Measure(
         "mean return of all training episodes: the area under the learning curve, by episode",
-        lambda _, result: float(result.returns.mean()),
+        lambda its: float(its.result.returns.mean()),
     ),
     "seconds": Measure(
         "time of the training; other each time, so it stands apart",
-        lambda _, result: round(result.seconds, 3),
+        lambda its: round(its.result.seconds, 3),
         more_is_better=False,
     ),
 }
@@ -83,9 +106,14 @@ def with_evaluations(config: TrainConfig, measures: Sequence[str]) -> dict[str, 
     return {"evaluate_every": max(1, config.episodes // EVALUATIONS)}
 
 
-def figures_of(found: SeedResult, result: TrainResult) -> dict[str, float | None]:
+def is_disturbed(measures: Sequence[str]) -> bool:
+    """Return whether greedy episodes are to be played under other disturbances."""
+    return any(name.startswith("robust") for name in measures)
+
+
+def figures_of(outcome: Outcome) -> dict[str, float | None]:
     """Return all figures of a training that are the same each time."""
-    return {name: each.of(found, result) for name, each in MEASURES.items() if name != APART}
+    return {name: each.of(outcome) for name, each in MEASURES.items() if name != APART}
 
 
 def curve_of(result: TrainResult) -> list[list[float]]:

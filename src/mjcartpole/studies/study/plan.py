@@ -6,6 +6,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any, Final, Self
 
+from mjcartpole.disturbances.disturbances import Disturbances
+from mjcartpole.envs.backend import check_backend
 from mjcartpole.errors import ConfigError, ModelError
 from mjcartpole.learning.checkpoints import checksum
 from mjcartpole.learning.config import TrainConfig
@@ -15,7 +17,7 @@ from mjcartpole.learning.training import training_grid
 from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.studies.multi_seed import SeedJob
 from mjcartpole.studies.study.design import Point, points_of
-from mjcartpole.studies.study.measures import plays_after, with_evaluations
+from mjcartpole.studies.study.measures import is_disturbed, plays_after, with_evaluations
 from mjcartpole.studies.study.settings import PRESET, as_text, config_of, is_edit
 from mjcartpole.studies.study.study_file import Study, raise_all
 
@@ -34,6 +36,7 @@ class PlannedRun:
         factors: The point.
         job: What is to be trained.
         cartpole: Its model.
+        tested: Under which disturbances it is played besides, if any.
     """
 
     key: str
@@ -41,6 +44,7 @@ class PlannedRun:
     factors: Point
     job: SeedJob
     cartpole: CartPole = field(repr=False)
+    tested: Disturbances | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,17 +127,19 @@ def _runs(
     chosen = choose_engine(engine, config.backend, cartpole if on_mujoco else None, config.rules)
     document = cartpole.xml if on_mujoco else None
     job = SeedJob(config, chosen, document, evaluated=plays_after(study.measure))
+    tested = study.robustness if is_disturbed(study.measure) else None
+    if tested:
+        check_backend(config.backend, config.model, config.integrator, tested.vary)
     for seed in study.seeds:
         one = job.of(seed)
-        yield PlannedRun(
-            _key(one.config, digest if on_mujoco else ""), number, point, one, cartpole
-        )
+        key = _key(one.config, digest if on_mujoco else "", tested)
+        yield PlannedRun(key, number, point, one, cartpole, tested)
 
 
-def _key(config: TrainConfig, digest: str) -> str:
-    """Return a hash of all that decides a training, whatever its model is called here."""
+def _key(config: TrainConfig, digest: str, tested: Disturbances | None) -> str:
+    """Return a hash of all that decides figures, whatever the model is called here."""
     values = config.stored() | ({"model": digest, "set": ()} if digest else {})
-    text = json.dumps(values, sort_keys=True)
+    text = json.dumps(values | ({"tested": tested.given} if tested else {}), sort_keys=True)
     return checksum(text)[:_KEY_DIGITS]
 
 

@@ -4,6 +4,7 @@ A process that is killed leaves at most one line that is cut short; that run is 
 """
 
 import contextlib
+import functools
 import json
 import socket
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -11,13 +12,16 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import BinaryIO, Final, Self
 
-from mjcartpole.errors import FileError
+from mjcartpole.disturbances.disturbances import Disturbances
+from mjcartpole.errors import FileError, MjCartPoleError
 from mjcartpole.files import brief, is_there, opened, sync
+from mjcartpole.learning.evaluation import Evaluation, evaluate
 from mjcartpole.learning.stored import Fields, checked, parse
+from mjcartpole.learning.training import TrainResult
 from mjcartpole.physics.cartpole import CartPole
-from mjcartpole.studies.multi_seed import OUT_OF_MEMORY, SeedJob, train_seed
+from mjcartpole.studies.multi_seed import OUT_OF_MEMORY, SeedJob, model_of, train_seed
 from mjcartpole.studies.side_by_side import Stop
-from mjcartpole.studies.study.measures import APART, MEASURES, curve_of, figures_of
+from mjcartpole.studies.study.measures import APART, MEASURES, Outcome, curve_of, figures_of
 from mjcartpole.versions import version_of
 
 LOG: Final = "results.jsonl"
@@ -89,17 +93,25 @@ class Record:
         return bool(self.error) or not greedy or self.figures["greedy_mean"] is not None
 
 
-def versions() -> dict[str, str]:
-    """Return the versions here of all that figures may depend on."""
+@functools.cache
+def versions() -> Mapping[str, str]:
+    """Return the versions here of all that figures may depend on; they are read once."""
     return {name: version_of(name) or "not installed" for name in PACKAGES}
 
 
-def do_run(key: str, job: SeedJob, stop: Stop, cartpole: CartPole | None = None) -> Record | None:
+def do_run(
+    key: str,
+    job: SeedJob,
+    tested: Disturbances | None,
+    stop: Stop,
+    cartpole: CartPole | None = None,
+) -> Record | None:
     """Train, and return what it came to; None if it was to stop, or has no memory here.
 
     Args:
         key: See `PlannedRun`.
         job: What is to be trained.
+        tested: Under which disturbances greedy episodes are played besides, if any.
         stop: Says when to stop.
         cartpole: The model, if it is loaded already; it is this run's own.
     """
@@ -108,10 +120,14 @@ def do_run(key: str, job: SeedJob, stop: Stop, cartpole: CartPole | None = None)
     if result is None:
         lasting = found.error and found.error != OUT_OF_MEMORY
         return _failed(key, found.error) if lasting else None
+    try:
+        disturbed = _disturbed(result, job, tested, cartpole) if tested else None
+    except MjCartPoleError as error:
+        return _failed(key, str(error))
     return Record(
         key=key,
         error="",
-        figures=figures_of(found, result),
+        figures=figures_of(Outcome(result, found.evaluation, disturbed)),
         episodes_trained=len(result.returns),
         steps_trained=result.steps,
         versions=versions(),
@@ -121,6 +137,21 @@ def do_run(key: str, job: SeedJob, stop: Stop, cartpole: CartPole | None = None)
         ],
         seconds=round(result.seconds, 3),
         host=socket.gethostname(),
+    )
+
+
+def _disturbed(
+    result: TrainResult, job: SeedJob, tested: Disturbances, cartpole: CartPole | None
+) -> Evaluation:
+    config = job.config
+    return evaluate(
+        result.policy,
+        backend=config.backend,
+        model="cartpole" if job.document is None else cartpole or model_of(job),
+        integrator=config.integrator,
+        task=config.rules,
+        disturbances=tested,
+        engine=job.engine,
     )
 
 

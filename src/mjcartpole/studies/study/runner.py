@@ -6,6 +6,7 @@ from concurrent.futures import BrokenExecutor, CancelledError, Future
 from typing import Any
 
 from mjcartpole.cores import worker_count
+from mjcartpole.disturbances.disturbances import Disturbances
 from mjcartpole.studies.multi_seed import SeedJob
 from mjcartpole.studies.side_by_side import Found, Stop, side_by_side
 from mjcartpole.studies.study.plan import Plan, PlannedRun
@@ -37,11 +38,11 @@ def run_here(runs: Runs, workers: int | None, stop: Stop) -> Found[Any, Record |
     """
     # The compiled engine leaves Python's lock alone.
     threads = all(run.job.engine == "compiled" for run in runs)
-    jobs = ((run.key, run.job) for run in runs if not stop())
+    jobs = ((run.key, run.job, run.tested) for run in runs if not stop())
     return side_by_side(_do, jobs, worker_count(workers, len(runs)), stop, threads=threads)
 
 
-def _do(run: tuple[str, SeedJob], stop: Stop) -> Record | None:
+def _do(run: tuple[str, SeedJob, Disturbances | None], stop: Stop) -> Record | None:
     return do_run(*run, stop)
 
 

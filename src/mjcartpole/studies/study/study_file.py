@@ -14,15 +14,16 @@ alpha = [0.05, 0.1]
 
 import tomllib
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, Final, get_args
 
+from mjcartpole.disturbances.disturbances import Disturbances
 from mjcartpole.errors import ConfigError, FileError, check_known
 from mjcartpole.files import brief, read_bytes
 from mjcartpole.studies.seeds import MAX_SEEDS
 from mjcartpole.studies.study.design import MOST_POINTS, Design, Factor, Range
-from mjcartpole.studies.study.measures import MEASURES
+from mjcartpole.studies.study.measures import MEASURES, is_disturbed
 from mjcartpole.studies.study.settings import check_setting, is_number, is_whole, read_value
 
 MOST_BYTES: Final = 2**20
@@ -42,6 +43,7 @@ class Study:
         samples: See `points_of`.
         design_seed: See `points_of`.
         baseline: Levels of factors that others are held against; the first of each if left out.
+        robustness: Disturbances under which policies are tested; None if they are not.
         base: Settings of all points.
         factors: What differs.
         text: The file.
@@ -53,6 +55,7 @@ class Study:
     samples: int = 0
     design_seed: int = 0
     baseline: Mapping[str, Any] = field(default_factory=dict)
+    robustness: Disturbances | None = None
     base: Mapping[str, Any] = field(default_factory=dict)
     factors: tuple[Factor, ...] = ()
     text: str = field(default="", repr=False)
@@ -90,7 +93,8 @@ def study_of(values: Mapping[str, Any], text: str = "") -> Study:
             "[factors] is empty, so there is nothing to compare; give one at least, such as "
             "alpha = [0.05, 0.1] (one config with many seeds is `mjcartpole train --seeds`)"
         )
-    study = Study(**about, base=base, factors=factors, text=text)
+    robustness = _robustness(tables["robustness"], mistakes)
+    study = Study(**about, robustness=robustness, base=base, factors=factors, text=text)
     mistakes += _together(study)
     raise_all(mistakes)
     return study
@@ -110,17 +114,16 @@ def raise_all(mistakes: list[str]) -> None:
 
 
 def _tables(values: Mapping[str, Any], mistakes: list[str]) -> dict[str, dict[str, Any]]:
-    names = ("study", "base", "factors")
+    names = ("study", "base", "factors", "robustness")
     for name, value in values.items():
         if name not in names:
-            mistakes.append(
-                f"[{name}] is no part of a study; its parts are [study], [base], [factors]"
-            )
+            parts = ", ".join(f"[{each}]" for each in names)
+            mistakes.append(f"[{name}] is no part of a study; its parts are {parts}")
         elif not isinstance(value, dict):
             mistakes.append(f"{name} must be a table, as in [{name}], not {value!r}")
     found = {name: values.get(name) for name in names}
     tables = {name: value if isinstance(value, dict) else {} for name, value in found.items()}
-    return {"study": tables["study"]} | {name: dict(_flat(tables[name])) for name in names[1:]}
+    return tables | {name: dict(_flat(tables[name])) for name in ("base", "factors")}
 
 
 def _flat(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
@@ -189,6 +192,18 @@ def _about(table: Mapping[str, Any], mistakes: list[str]) -> dict[str, Any]:
     return dict(_each(table, "study", read, mistakes))
 
 
+def _robustness(table: Mapping[str, Any], mistakes: list[str]) -> Disturbances | None:
+    if not table:
+        return None
+    try:
+        for name in table:
+            check_known("disturbance", name, [each.name for each in fields(Disturbances)])
+        return Disturbances(**{name: read_value(name, value) for name, value in table.items()})
+    except ConfigError as error:
+        mistakes.append(f"[robustness] {error}")
+        return Disturbances()
+
+
 def _seeds(name: str, value: Any) -> tuple[int, ...]:  # noqa: ANN401
     few = type(value) is int and value <= MAX_SEEDS
     many = value if isinstance(value, list) else range(value) if few else []
@@ -244,6 +259,11 @@ def _together(study: Study) -> Iterator[str]:
         yield f'[study] design = "{study.design}" needs samples = N, the number of points'
     if study.design == "grid" and study.samples:
         yield '[study] samples is for design = "random" or "latin"; a grid has all combinations'
+    if is_disturbed(study.measure) != (study.robustness is not None):
+        yield (
+            "[robustness] and the measures robust_mean and robust_minimum belong together: it says "
+            "under which disturbances, such as noise = 0.01"
+        )
     for factor in study.factors:
         ranged = isinstance(factor.levels, Range) and factor.levels.levels is None
         if ranged and study.design == "grid":
