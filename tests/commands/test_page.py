@@ -3,11 +3,17 @@
 import json
 import re
 import shutil
+from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
-from command_line import call
+from command_line import QUICK, call, done
+from mjcartpole.disturbances.disturbances import NONE
+from mjcartpole.page.run_data import packed
 from mjcartpole.page.told import facts_of
+from mjcartpole.studies.film import play
+from mjcartpole.studies.policy_setup import find_setup
 from pages import needs_assets
 
 
@@ -49,6 +55,20 @@ def test_a_model_may_be_edited_and_a_policys_file_has_a_page_too(run, here, caps
     assert 'fromto="0 0 0 0 0 1.5"' in data["document"]
 
 
+def test_what_was_added_in_training_is_told_and_left_out(here, capsys):
+    given = ["--delay", "2", "--noise", "0.1", "--vary", "pole.length=0.5:1.5"]
+    done(["train", *QUICK, *given, "--run-dir", "runs/rough"])
+    done(["train", *QUICK, "--observe-actions", "1", "--run-dir", "runs/sees"])
+    capsys.readouterr()
+    assert page(capsys, "runs/rough")[0] == 0
+    (data,) = data_of(here / "rough.html")
+    assert data["disturbances"] == "--vary pole.length=0.5:1.5 --delay 2 --noise 0.1"
+    (undisturbed,) = play(replace(find_setup(Path("runs/rough")), disturbances=NONE))
+    assert data["episode"]["states"] == packed(undisturbed.states)
+    code, _, err = page(capsys, "runs/sees")
+    assert code == 2 and "sees looks at actions before, which a page does not show" in err
+
+
 def test_gymnasiums_policy_is_played_on_the_reference_model(run, here, capsys):
     code, _, _ = page(capsys, run, "--backend", "gym")
     (data,) = data_of(here / "mine.html")
@@ -88,6 +108,7 @@ def test_what_is_there_is_not_replaced_unless_asked(run, here, capsys):
     [
         ([], "needs a RUN-OR-POLICY"),
         (["runs/mine", "-o", "page.pdf"], "a page is an .html"),
+        (["runs/mine", "--delay", "2"], "a page plays without disturbances; leave out --delay"),
         (["runs/other"], "no run folder or policy file"),
     ],
 )

@@ -1,9 +1,12 @@
 """The page in a real browser: opened from disk, without a network, and read back."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from command_line import QUICK, done
+from mjcartpole.disturbances.disturbances import Disturbances
 from mjcartpole.page.document import page_html
 from mjcartpole.page.run_data import run_data
 from mjcartpole.page.told import Told
@@ -191,6 +194,18 @@ def test_without_webassembly_it_says_so(page):
 
 def test_reduced_motion_begins_paused(page):
     assert found(page, evaluate("mjcartpole.stage.paused"), still=True) == [True]
+
+
+def test_it_says_that_disturbances_are_left_out(tmp_path, trained):
+    needs_assets()
+    setup = replace(find_setup(trained), disturbances=Disturbances(delay=2, push="1@~4s"))
+    path = tmp_path / "rough.html"
+    path.write_text(page_html([run_data(setup, Told(), "mujoco")]), encoding="utf-8")
+    lead, parity = found(
+        path, evaluate("document.querySelector('.lead').innerText"), evaluate("mjcartpole.parity")
+    )
+    assert "trained with --delay 2 --push '1@~4s', and is played here without." in lead
+    assert parity["early"] <= 1e-12
 
 
 def test_nothing_hostile_runs(tmp_path, trained):

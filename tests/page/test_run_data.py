@@ -8,6 +8,8 @@ import math
 import numpy as np
 import pytest
 
+from mjcartpole.disturbances.disturbances import Disturbances
+from mjcartpole.errors import ConfigError
 from mjcartpole.learning.discretizer import Discretizer
 from mjcartpole.learning.policy import Policy
 from mjcartpole.page.run_data import packed, run_data
@@ -40,6 +42,21 @@ def test_the_episode_is_the_first_that_is_played():
     (rollout,) = play(setup())
     assert unpacked(data["episode"]["states"]).tobytes() == rollout.states.tobytes()
     assert data["episode"]["ending"] == rollout.episode.ending
+
+
+def test_what_was_added_is_told_and_not_played():
+    some = Disturbances(delay=3, noise=0.1)
+    data = run_data(setup(disturbances=some), Told(), "mujoco")
+    assert data["disturbances"] == "--delay 3 --noise 0.1"
+    assert data["episode"] == run_data(setup(), Told(), "mujoco")["episode"]
+    assert run_data(setup(), Told(), "mujoco")["disturbances"] == ""
+
+
+def test_a_table_that_looks_at_actions_before_is_refused():
+    grid = Discretizer((1, 1, 2, 2, 2), (*GRID.low, -1.0), (*GRID.high, 1.0), actions=1)
+    sees = PolicySetup("sees", Policy(grid, np.zeros((*grid.shape, 2))))
+    with pytest.raises(ConfigError, match="sees looks at actions before"):
+        run_data(sees, Told(), "mujoco")
 
 
 def test_the_table_and_the_grid_are_the_policys():

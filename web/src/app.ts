@@ -23,6 +23,10 @@ const OTHER = "another pole than the one that was recorded: parity does not appl
 const HERE = "MuJoCo itself moves it, here in your browser: drag it, push it, change it, or balance it yourself.";
 const GYM = `It was trained on gymnasium's own CartPole-v1, and is played here on the reference model under explicit Euler: the same motion but for rounding. ${HERE}`;
 
+/** Return what is said of disturbances, which the page leaves out. */
+const trainedWith = ({ disturbances }: RunData): string =>
+  disturbances ? `It was trained with ${disturbances}, and is played here without. ` : "";
+
 export class App {
   readonly element: HTMLElement;
   readonly stage: Stage | null = null;
@@ -64,7 +68,7 @@ export class App {
     if (this.switches) this.switches.value = String(index);
     const table = await numbersOf(this.run.table);
     this.policy = new Policy(this.run.grid, table);
-    this.lead.textContent = `A table of ${table.length.toLocaleString("en")} numbers keeps this pole up. ${this.run.backend === "gym" ? GYM : HERE}`;
+    this.lead.textContent = `A table of ${table.length.toLocaleString("en")} numbers keeps this pole up. ${trainedWith(this.run)}${this.run.backend === "gym" ? GYM : HERE}`;
     const panel = new TablePanel(this.policy, this.run.parts.hinges.length);
     this.top.querySelector(".table")?.remove();
     this.top.append(panel.element);

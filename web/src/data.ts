@@ -45,6 +45,8 @@ export interface RunData {
   document: string;
   assets: Record<string, string>;
   backend: "mujoco" | "gym";
+  /** With what it was trained, as flags; none of it is played here. */
+  disturbances: string;
   integrator: "gym" | "mujoco";
   own_timestep: boolean;
   parts: PartsData;

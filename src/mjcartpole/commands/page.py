@@ -43,15 +43,24 @@ class Page(Command):
         from mjcartpole.commands.policies import set_up, shown
         from mjcartpole.media.plots import is_installed
         from mjcartpole.page.document import check_built, page_html
+        from mjcartpole.page.run_data import check_shown
 
         if not self.sources:
             raise UsageError("page needs a RUN-OR-POLICY, or several; see mjcartpole page --help")
+        if asked := self.target.additions:
+            flag = next(iter(asked)).replace("_", "-")
+            raise UsageError(
+                f"a page plays without disturbances; leave out --{flag}, or film them: "
+                "mjcartpole render"
+            )
         check_built()
         plots = self.plots and is_installed()
         if self.plots and not plots:
             print("mjcartpole: no plots: matplotlib is not installed ([plot])", file=sys.stderr)
         sources = [shown(source) for source in self.sources]
         setups = [set_up(source, self.target) for source in sources]
+        for setup in setups:
+            check_shown(setup)
         path = self.output or Path(f"{setups[0].name}.html")
         self._check(path)
         pairs = zip(sources, setups, strict=True)

@@ -11,7 +11,10 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
+from mjcartpole.disturbances.disturbances import NONE
+from mjcartpole.errors import ConfigError
 from mjcartpole.files import read_bytes
+from mjcartpole.learning.naming import added_flags
 from mjcartpole.page.told import Told
 from mjcartpole.physics.bodies import starting_state
 from mjcartpole.studies.film import play
@@ -31,15 +34,16 @@ def run_data(setup: PolicySetup, told: Told, backend: str) -> dict[str, Any]:
     """Return all that the page needs of a policy that is played on MuJoCo.
 
     Args:
-        setup: The policy, and where it is played; its first episode is recorded.
+        setup: The policy, and where it is played; its first episode is recorded, undisturbed.
         told: What is told of it.
         backend: Where it was trained.
 
     Raises:
-        ConfigError: The policy is one for another number of poles.
+        ConfigError: The policy is one for another number of poles, or looks at actions before.
         FileError: A file of the model cannot be read.
         SimulationError: The physics diverged.
     """
+    check_shown(setup)
     cartpole, (rollout,) = setup.cartpole, play(_recorded(setup))
     document, files = cartpole.stored
     return {
@@ -47,6 +51,7 @@ def run_data(setup: PolicySetup, told: Told, backend: str) -> dict[str, Any]:
         "document": document,
         "assets": {name: in_base64(_content(source)) for name, source in files.items()},
         "backend": backend,
+        "disturbances": added_flags(setup.disturbances),
         "integrator": setup.integrator,
         "own_timestep": not math.isclose(cartpole.control_step, CONTROL_STEP),
         "parts": _some(cartpole, _PARTS),
@@ -72,10 +77,24 @@ def run_data(setup: PolicySetup, told: Told, backend: str) -> dict[str, Any]:
     }
 
 
+def check_shown(setup: PolicySetup) -> None:
+    """Refuse a table that a page cannot play.
+
+    Raises:
+        ConfigError: It looks at actions before, or the policy is a controller.
+    """
+    if setup.table.actions:
+        raise ConfigError(
+            f"{setup.name} looks at actions before, which a page does not show; film it instead: "
+            "mjcartpole render"
+        )
+
+
 def _recorded(setup: PolicySetup) -> PolicySetup:
     """Return where an episode is played that the page is to play again: no longer than most are."""
     most = min(setup.task.time_limit, CARTPOLE_V1.time_limit)
-    return dataclasses.replace(setup, task=setup.task.with_changes(max_episode_steps=most))
+    task = setup.task.with_changes(max_episode_steps=most)
+    return dataclasses.replace(setup, task=task, disturbances=NONE)
 
 
 def packed(numbers: npt.NDArray[np.float64]) -> str:
