@@ -123,6 +123,8 @@ def main() -> None:
     question = QUESTIONS[arguments.question]
     seeds = range(arguments.first_seed, arguments.first_seed + arguments.seeds)
     found = {name: returns_of(question, make, seeds) for name, make in question.learners.items()}
+    engineer = [play(question, level, regulator(question, level)) for level in question.levels]
+    found[LQR] = np.array([engineer])
     print_table(question, found)
     if arguments.plot:
         write_plot(plot(question, found), arguments.plot)

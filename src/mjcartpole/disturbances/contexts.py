@@ -1,6 +1,7 @@
 """Contexts: what an episode draws of the numbers that vary, and the generator that draws it."""
 
 import functools
+import itertools
 import math
 from typing import Final, NamedTuple
 
@@ -14,6 +15,9 @@ Context = dict[str, float]
 
 STREAM: Final = 2
 """Spawn key of what draws disturbances."""
+
+_BLOCK: Final = 64
+"""Episodes whose contexts are drawn at once."""
 
 POOL_SEED: Final = 0
 """Of the models that all trainings share."""
@@ -32,22 +36,30 @@ class Contexts(NamedTuple):
     pool: int
     widen: int
 
-    def draw(self, rng: np.random.Generator, number: int) -> Context:
+    def of(self, key: tuple[int, ...], number: int) -> Context:
         """Return the context of an episode.
 
         Args:
-            rng: Draws it.
+            key: Seeds what draws it.
             number: The episode, counted from 0.
         """
-        share = min(1.0, (number + 1) / self.widen) if self.widen else 1.0
+        width = min(1.0, (number + 1) / self.widen) if self.widen else 1.0
+        drawn = _shares(key, number // _BLOCK, len(self.ranges))[number % _BLOCK]
         if self.pool:
-            among = math.ceil(share * self.pool)
-            return self.models()[int(rng.random() * among)]
-        return {each.name: each.at(each.narrowed(rng.random(), share)) for each in self.ranges}
+            return self.models()[int(drawn[0] * math.ceil(width * self.pool))]
+        shares = map(Range.narrowed, self.ranges, drawn, itertools.repeat(width))
+        return {each.name: each.at(share) for each, share in zip(self.ranges, shares, strict=True)}
 
     def models(self) -> list[Context]:
         """Return the pool, what is nearest to the middle of the ranges first."""
         return _pool(self.ranges, self.pool)
+
+
+@functools.lru_cache(maxsize=64)
+def _shares(key: tuple[int, ...], block: int, n: int) -> list[list[float]]:
+    """Numbers from 0 to 1 for each of a block of episodes: to seed a generator for each costs."""
+    drawn: list[list[float]] = np.random.default_rng([*key, block]).random((_BLOCK, n)).tolist()
+    return drawn
 
 
 @functools.lru_cache(maxsize=16)
@@ -100,4 +112,4 @@ class Chance(NamedTuple):
 
     def context(self, contexts: Contexts, number: int) -> Context:
         """Return what an episode draws, counted from 0."""
-        return contexts.draw(np.random.default_rng([*self.key, number]), number)
+        return contexts.of(self.key, number)

@@ -1,9 +1,11 @@
 """The compiled engine: episodes in chunks, so that whoever waits can look, stop and save."""
 
+import functools
 import logging
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Final
 
+import numba
 import numpy as np
 import numpy.typing as npt
 from numba.core import config, event
@@ -137,7 +139,8 @@ class CompiledLoop:
         log: EpisodeLog,
         chance: Chance | None = None,
     ) -> None:
-        """Compile what `learn` runs, or load it from the cache; nothing is learned."""
+        """Compile what `learn` runs, or load it from the cache, and models; nothing is learned."""
+        self._worlds.prepare()
         self._learn(learner, discretizer, env_rng, log, 0, 0, chance)
 
     def _learn(
@@ -151,13 +154,13 @@ class CompiledLoop:
         chance: Chance | None,
     ) -> None:
         kernel = kernels.learn_chunk(learner.method, self._task.reward)
-        left = self._chunk
+        run: Callable[..., int] = functools.partial(_run, kernel)
+        grid, left = _arrays(discretizer.grid), self._chunk
         for first, last in self._worlds.parts(start, stop):
-            _run(
-                kernel,
+            arguments = (
                 self._worlds.physics(chance, first),
                 self._rules,
-                _arrays(discretizer.grid),
+                grid,
                 learner.p,
                 learner.memory,
                 (env_rng, learner.rng),
@@ -167,6 +170,8 @@ class CompiledLoop:
                 learner.visits,
                 self._scratch,
             )
+            run(*arguments)
+            run = _for_these(kernel, arguments) if first == start and self._worlds.vary else run
             left -= int(log.storage.steps[first]) if self._worlds.vary and last > first else 0
             if self._scratch.finished[0] != last or left <= 0:
                 return
@@ -193,7 +198,7 @@ class CompiledLoop:
         grid = _arrays(policy.discretizer.grid)
         common = (self._rules, grid, policy.tiles, policy.choices, starts)
         while len(log) < episodes:
-            first, last = self._worlds.parts(len(log), episodes)[0]
+            first, last = next(self._worlds.parts(len(log), episodes))
             number = _run(
                 kernels.play_chunk(self._task.reward),
                 self._worlds.physics(chance, first),
@@ -266,6 +271,17 @@ class _Announcer(event.Listener):
         self._depth -= 1
         if self._depth <= 0:
             compiling.discard(self)
+
+
+def _for_these(kernel: Callable[..., int], arguments: Sequence[object]) -> Callable[..., int]:
+    """Return what a kernel is for arguments of these types: to find it takes longer than to run."""
+    try:
+        form: Callable[..., int] = kernel.get_overload(  # type: ignore[attr-defined]
+            tuple(map(numba.typeof, arguments))
+        )
+    except KeyError:  # It runs without its cache.
+        return functools.partial(_run, kernel)
+    return form
 
 
 def _run(kernel: Callable[..., int], *arguments: object) -> int:

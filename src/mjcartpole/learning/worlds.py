@@ -1,5 +1,6 @@
 """What compiled episodes are played in: one physics, or another one for each where models vary."""
 
+from collections.abc import Iterator
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -70,17 +71,24 @@ class Worlds:
             return physics._replace(rng=chance.rng)
         return physics
 
-    def parts(self, start: int, stop: int) -> list[tuple[int, int]]:
-        """Return which episodes have the same physics: all of them, or each its own."""
+    def prepare(self) -> None:
+        """Make all there are, where they come from a pool."""
+        if self._contexts and self._contexts.pool and self.cartpole:
+            for context in self._contexts.models():
+                self._kept(variant(self.cartpole, context))
+
+    def parts(self, start: int, stop: int) -> Iterator[tuple[int, int]]:
+        """Yield which episodes have the same physics: all of them, or each its own."""
         if not self.vary or start == stop:
-            return [(start, stop)]
-        return [(number, number + 1) for number in range(start, stop)]
+            yield start, stop
+        else:
+            yield from ((number, number + 1) for number in range(start, stop))
 
     def _kept(self, cartpole: CartPole) -> "_World":
         found = self._made.get(id(cartpole))
         if found is None:
-            for oldest in list(self._made)[: len(self._made) - self._most + 1]:
-                del self._made[oldest]
+            while len(self._made) >= self._most:
+                del self._made[next(iter(self._made))]
             # What is kept beside it keeps its id.
             found = self._made[id(cartpole)] = cartpole, self._make(cartpole)
         return found[1]

@@ -28,9 +28,9 @@ def variant(base: CartPole, context: Context) -> CartPole:
     found = _kept.get(key)
     if found is None:
         found = load_shared(base, context, own_timestep=base.has_own_timestep)
-        for oldest in list(_kept)[: len(_kept) - MOST + 1]:
-            _kept.pop(oldest, None)
         _kept[key] = found
+        for oldest in list(_kept)[: max(0, len(_kept) - MOST)]:
+            _kept.pop(oldest, None)
     return found
 
 
