@@ -66,6 +66,13 @@ def test_a_point_that_makes_no_sense_is_told(factors, base, said):
         planned(factors, base)
 
 
+def test_a_mistake_of_many_points_is_told_once():
+    with pytest.raises(ConfigError) as refused:
+        planned({"gamma": [0.9, 2.0], "alpha": [0.1, 0.2, 0.3]})
+    (line,) = str(refused.value).split("\n")
+    assert line.startswith("gamma=2.0 alpha=0.1 (and 2 points more): gamma must be")
+
+
 def test_to_say_when_it_was_solved_a_training_is_evaluated():
     found = planned({"alpha": [0.1]}, {"episodes": 60}, measure=["episodes_to_solve"])
     assert found.runs[0].job.config.evaluate_every == 3

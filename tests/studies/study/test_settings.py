@@ -33,7 +33,8 @@ def test_the_values_of_a_config_are_read_back_as_they_are(method):
     config = config_class(method)()
     values = {name: config.values()[name] for name in kinds() if name in config.fields()}
     for name, value in values.items():
-        written = list(value) if isinstance(value, tuple) else "none" if value is None else value
+        written = "none" if value in (None, ()) else value
+        written = list(value) if isinstance(value, tuple) and value else written
         assert read_value(name, written) == value
     assert config_of({}, values, 3) == dataclasses.replace(config, seed=3)
 

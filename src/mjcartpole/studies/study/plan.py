@@ -74,15 +74,14 @@ def plan(study: Study, engine: Engine = "compiled") -> Plan:
             f"{len(points):,} points with {len(study.seeds):,} seeds each are more than "
             f"{MOST_RUNS:,} runs; give fewer"
         )
-    mistakes, runs, models = list[str](), list[PlannedRun](), dict[Any, _Model]()
+    mistakes, runs, models = dict[str, list[Point]](), list[PlannedRun](), dict[Any, _Model]()
     for number, point in enumerate(points, start=1):
         try:
             runs += _runs(study, point, number, engine, models)
         except (ConfigError, ModelError) as error:
-            mistakes.append(f"{in_words(point)}: {error}")
-    if not mistakes:
-        mistakes += _in_vain(study, runs)
-    raise_all(mistakes)
+            mistakes.setdefault(str(error), []).append(point)
+    raise_all([_told(error, where) for error, where in mistakes.items()])
+    raise_all(list(_in_vain(study, runs)))
     return Plan(study, len(points), tuple(runs))
 
 
@@ -93,6 +92,11 @@ def in_words(point: Point) -> str:
     'alpha=0.1 bins=1,3'
     """
     return " ".join(f"{name}={as_text(value)}" for name, value in point.items())
+
+
+def _told(error: str, points: list[Point]) -> str:
+    others = f" (and {len(points) - 1:,} points more)" if points[1:] else ""
+    return f"{in_words(points[0])}{others}: {error}"
 
 
 @dataclass(frozen=True)

@@ -76,8 +76,8 @@ def read_value(name: str, value: Any) -> Any:  # noqa: ANN401 - whatever a field
         parse_edit(f"{name}={value}")
         return value
     for kind in kinds()[name]:
-        if value == NONE and fits(None, kind):
-            return None
+        if value == NONE and (fits(None, kind) or fits([], kind)):
+            return None if fits(None, kind) else ()
         for given in (value, [value]):
             if fits(given, kind):
                 return _as_kind(given, kind)
@@ -124,7 +124,7 @@ def as_text(value: Any) -> str:  # noqa: ANN401 - whatever a field holds
     ('1,3,6,8', 'none', '0.5', 'true')
     """
     match value:
-        case None:
+        case None | ():
             return NONE
         case bool():
             return str(value).lower()
