@@ -250,3 +250,12 @@ def test_a_seed_of_dm_control_disturbs_alike_again() -> None:
     first = env.reset().observation["position"]
     env.task.random.seed(3)
     assert env.reset().observation["position"].tolist() == first.tolist()
+
+
+def test_what_is_edited_for_an_episode_is_not_drawn() -> None:
+    env = gymnasium.make(ID, vary=LENGTHS, observe_context=True)
+    _, info = env.reset(seed=0, options={"edits": {"pole.length": 1.25, "gravity": 3.7}})
+    assert info["context"]["pole.length"] == 1.25
+    assert (env.unwrapped.length, env.unwrapped.gravity) == (0.625, 3.7)
+    assert env.reset(seed=0)[1]["context"]["pole.length"] != 1.25
+    assert env.unwrapped.gravity == 9.8

@@ -149,3 +149,24 @@ def test_another_method_takes_what_it_has_of_a_preset(preset):
     ours = {name: value for name, value in PRESETS[preset].items() if name not in others}
     assert {name: getattr(config, name) for name in ours} == ours
     assert (config.method, config.seed) == ("sarsa", 3)
+
+
+def test_a_number_is_set_or_varies():
+    with pytest.raises(ConfigError, match=r"'pole.length' is set, and varies; give it once"):
+        TrainConfig(set=("pole.length=2",), vary=("pole.length=1:3",))
+    assert TrainConfig(set=("pole.mass=2",), vary=("pole.length=1:3",)).disturbances.pool == 100
+
+
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [
+        ({"vary": {"force": (8, 12)}, "backend": "gym"}, "it takes no model"),
+        ({"method": "planning", "observe_actions": 1}, "no action before is seen"),
+        ({"method": "identify", "observe_actions": 1}, "no action before is seen"),
+        ({"vary": {"force": (8, 12)}, "observe_context": True}, "has no bins for what varies"),
+        ({"delay": 30, "max_episode_steps": 30}, "no shorter than an episode"),
+    ],
+)
+def test_disturbances_that_no_training_has_are_refused(values, said):
+    with pytest.raises(ConfigError, match=said):
+        TrainConfig(**values)

@@ -350,7 +350,7 @@ class CartPoleEnv(
             simulation = self._begin(edits)
         super().reset(seed=seed)
         if disturber is not None:
-            context = disturber.draw(self.np_random)
+            context = disturber.draw(self.np_random, edits)
             simulation = self._begin(edits, context) if varies else simulation
         assert simulation
         state = self.np_random.uniform(low=low, high=high, size=simulation.size)

@@ -15,6 +15,8 @@ from mjcartpole.disturbances.effects import QUEUE, Effects, actuate, forget, sen
 from mjcartpole.envs.observations import Observation, Observed, with_cosines
 from mjcartpole.errors import ResetNeededError
 from mjcartpole.physics.cartpole import CartPole
+from mjcartpole.physics.edit.edits import edits_of
+from mjcartpole.physics.load import Edits
 from mjcartpole.physics.simulation import Simulation, State
 from mjcartpole.physics.variants import contexts_of
 from mjcartpole.task import CONTROL_STEP, Task, control_of
@@ -92,11 +94,15 @@ class Disturber:
         if chance and before:
             chance.rng.bit_generator.state = before
 
-    def draw(self, np_random: np.random.Generator) -> Context:
-        """Return the context of the next episode."""
+    def draw(self, np_random: np.random.Generator, edits: Edits = None) -> Context:
+        """Return the context of the next episode; what is edited for it is not drawn."""
         self.follow(np_random)
         if self._contexts and self._chance:
-            self.context = self._chance.context(self._contexts, self._episode)
+            drawn, fixed = (
+                self._chance.context(self._contexts, self._episode),
+                edits_of(edits or ()),
+            )
+            self.context = {name: float(fixed.get(name, drawn[name])) for name in drawn}  # type: ignore[arg-type]
         self._episode += 1
         return self.context
 
