@@ -62,6 +62,7 @@ def test_a_file_means_what_it_says(tmp_path):
         ("[factors]\nalpa = [0.1]", "did you mean alpha?"),
         ("[factors]\nalpha = {low = 1, high = 0}", "low below high"),
         ("[factors]\nalpha = {low = 0, high = 1, log = true}", "needs a range above 0"),
+        ("[factors]\nalpha = {low = -inf, high = 1, levels = 3}", "low below high"),
         ("[factors]\nalpha = {low = 0, high = 1}", "a grid needs levels = N"),
         ("[factors]\nalpha = {low = 0, hihg = 1}", "did you mean 'high'?"),
         ("[factors]\nalpha = {low = 0, high = 1, levels = 1}", "a whole number from 2 up"),

@@ -12,6 +12,7 @@ alpha = [0.05, 0.1]
 "pole.length" = [0.5, 1.0]
 """
 
+import math
 import tomllib
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, fields
@@ -172,7 +173,8 @@ def _range(name: str, value: dict[str, Any]) -> Range:
     if not is_number(name):
         raise ConfigError(f"{name} is no number, and has no range; give a list of levels")
     numbers = (read_value(name, low), read_value(name, high))
-    if any(type(each) not in (int, float) for each in numbers) or not numbers[0] < numbers[1]:
+    real = all(type(each) in (int, float) and math.isfinite(each) for each in numbers)
+    if not (real and numbers[0] < numbers[1]):
         raise ConfigError(
             f"{name}: a range needs two numbers, low below high, not {low!r}, {high!r}"
         )
