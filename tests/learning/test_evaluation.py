@@ -53,6 +53,7 @@ def test_the_summary_is_plain():
 def test_the_summary_says_what_was_added():
     played = evaluate(falling, episodes=2, disturbances=Disturbances(delay=1, noise=0.5))
     assert played.summary()["disturbances"] == "--delay 1 --noise 0.5"
+    assert "2 episodes on mujoco with --delay 1 --noise 0.5, seed" in repr(played)
 
 
 @pytest.mark.parametrize("backend", ["mujoco", "gym"])

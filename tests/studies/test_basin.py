@@ -1,5 +1,7 @@
 """How long a policy lasts, from many starts."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -42,6 +44,15 @@ def test_both_engines_disturb_alike(backend):
     found = survival(setup, starts())
     assert found.tolist() == survival(setup, starts(), "python").tolist()
     assert found.tolist() != survival(PolicySetup("leans", LEANS, backend), starts()).tolist()
+
+
+def test_what_was_added_is_said_and_models_are_of_a_pool():
+    some = Disturbances(vary="pole.length=0.5:2", delay=1)
+    grid = basin(PolicySetup("leans", LEANS, disturbances=some), points=3)
+    assert grid.notes[1] == "with --vary pole.length=0.5:2 --delay 1 --pool 100"
+    pooled = PolicySetup("leans", LEANS, disturbances=replace(some, pool=100))
+    again = basin(pooled, points=3)
+    assert again.fields[0][0].values.tolist() == grid.fields[0][0].values.tolist()
 
 
 def test_a_table_that_looks_at_actions_starts_before_any():

@@ -96,7 +96,8 @@ class Evaluation:
         return f"<pre>{html.escape(repr(self))}</pre><table>{rows}</table>"
 
     def __repr__(self) -> str:
-        played = f"{len(self.episodes)} episodes on {self.backend}, seed {self.seed}"
+        added = f" with {flags}" if (flags := added_flags(self.disturbances)) else ""
+        played = f"{len(self.episodes)} episodes on {self.backend}{added}, seed {self.seed}"
         figures = (
             f": mean return {self.mean:.2f}, minimum {self.minimum:g}" if self.episodes else ""
         )

@@ -2,6 +2,7 @@
 
 import contextlib
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -11,6 +12,7 @@ from gymnasium.utils import seeding
 from mjcartpole.disturbances.contexts import Chance
 from mjcartpole.envs.backend import make_env
 from mjcartpole.errors import ConfigError
+from mjcartpole.learning.config import POOL
 from mjcartpole.learning.engine import Engine, choose_engine
 from mjcartpole.learning.loop import play_episode
 from mjcartpole.learning.slices import Axes, check_of_state, choose_axes, names_of, states_over
@@ -47,7 +49,7 @@ def basin(
     """
     if not 2 <= points <= MOST_POINTS:
         raise ConfigError(f"points must be a whole number from 2 to {MOST_POINTS:,}, not {points}")
-    policy, task = setup.table, setup.task
+    policy, task, setup = setup.table, setup.task, _with_pool(setup)
     policy.check_fits(setup.cartpole.poles, setup.cartpole.name)
     check_of_state(policy.discretizer, (*dims, *(at or {})))
     axes = choose_axes(policy.discretizer, dims, "none", at)
@@ -62,8 +64,19 @@ def basin(
         shown,
         [[Field("steps", "", (a, b), steps)]],
         most=task.time_limit,
-        notes=[f"starts at {', '.join(held)}; {(steps >= task.time_limit).mean():.0%} last"],
+        notes=[
+            f"starts at {', '.join(held)}; {(steps >= task.time_limit).mean():.0%} last",
+            *setup.notes,
+        ],
     )
+
+
+def _with_pool(setup: PolicySetup) -> PolicySetup:
+    """Return the same with models that vary from a pool: one for each start would take minutes."""
+    added = setup.disturbances
+    if not added.vary or added.pool is not None:
+        return setup
+    return replace(setup, disturbances=replace(added, pool=POOL))
 
 
 def _range(axes: Axes, dimension: int, setup: PolicySetup) -> tuple[float, float]:

@@ -15,7 +15,9 @@ from mjcartpole.learning import evaluation, runs
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.controllers import Controller, controller
 from mjcartpole.learning.evaluation import SEED, Evaluation, Player
+from mjcartpole.learning.naming import added_flags
 from mjcartpole.learning.policy import Policy
+from mjcartpole.media.plots import short
 from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.load import ModelLike, load_model
 from mjcartpole.studies import multi_seed_runs
@@ -58,6 +60,12 @@ class PolicySetup:
     def world(self) -> tuple[Backend, ModelLike, Integrator, Task, Disturbances]:
         """Where it is played, as both engines take it."""
         return self.backend, self.model, self.integrator, self.task, self.disturbances
+
+    @property
+    def notes(self) -> list[str]:
+        """What a plot says of disturbances; nothing where there are none."""
+        flags = added_flags(self.disturbances)
+        return [f"with {short(flags, 80)}"] if flags else []
 
     def evaluate(self, episodes: int) -> Evaluation:
         """Play greedy episodes; see `mjcartpole.evaluate`."""

@@ -164,6 +164,7 @@ def phase(
         notes=[
             *(f"the table {words}" for words in drawn.notes),
             f"{len(paths)} episodes: from a dot to a square (time limit) or a cross",
+            *setup.notes,
         ],
     )
 
