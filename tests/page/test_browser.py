@@ -201,11 +201,17 @@ def test_it_says_that_disturbances_are_left_out(tmp_path, trained):
     setup = replace(find_setup(trained), disturbances=Disturbances(delay=2, push="1@~4s"))
     path = tmp_path / "rough.html"
     path.write_text(page_html([run_data(setup, Told(), "mujoco")]), encoding="utf-8")
-    lead, parity = found(
-        path, evaluate("document.querySelector('.lead').innerText"), evaluate("mjcartpole.parity")
-    )
-    assert "trained with --delay 2 --push '1@~4s', and is played here without." in lead
+    choose = "(n, value) => { const s = document.querySelectorAll('.choice select')[n];"
+    choose += " s.value = value; s.dispatchEvent(new Event('change')); }"
+    lead, parity, early, late = found(
+        path, evaluate("document.querySelector('.lead').innerText"), evaluate("mjcartpole.parity"),
+        still([0, 0, 0.02, 0]), STEP, evaluate("play.simulation.data.ctrl[0]"),
+        do(f"({choose})(1, '6')"), still([0, 0, 0.02, 0]), STEP,
+        evaluate("play.simulation.data.ctrl[0]"),
+    )  # fmt: skip
+    assert "trained with --delay 2 --push '1@~4s', and is played here without, but for" in lead
     assert parity["early"] <= 1e-12
+    assert (abs(early), late) == (1, 0)
 
 
 def test_nothing_hostile_runs(tmp_path, trained):

@@ -25,7 +25,7 @@ const GYM = `It was trained on gymnasium's own CartPole-v1, and is played here o
 
 /** Return what is said of disturbances, which the page leaves out. */
 const trainedWith = ({ disturbances }: RunData): string =>
-  disturbances ? `It was trained with ${disturbances}, and is played here without. ` : "";
+  disturbances ? `It was trained with ${disturbances}, and is played here without, but for the delay and the noise that you choose. ` : "";
 
 export class App {
   readonly element: HTMLElement;

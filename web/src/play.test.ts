@@ -75,6 +75,30 @@ it("adds the keys' push to the table's, and takes it away again", () => {
   expect(Array.from(game.simulation.data.xfrc_applied as Float64Array).every((force) => force === 0)).toBe(true);
 });
 
+it("lets the table's pushes come late, and none before", () => {
+  const game = play();
+  game.gap.delay = 2;
+  game.restart([0, 0, 0.01, 0]);
+  const moved = [1, 2, 3].map(() => { game.step(); return game.simulation.data.ctrl[0]; });
+  expect(moved).toEqual([0, 0, 1]);
+  game.gap.delay = 0;
+  game.restart([0, 0, -0.01, 0]);
+  game.step();
+  expect(game.simulation.data.ctrl[0]).toBe(-1);
+});
+
+it("shows the table a state with noise, the same until the next step", () => {
+  const game = play();
+  game.gap.noise = 5;
+  const chosen = new Set<number>();
+  for (let i = 0; i < 40; i++) {
+    game.restart([0, 0, 0.1, 0]);
+    expect(game.look.action).toBe(game.look.action);
+    chosen.add(game.look.action);
+  }
+  expect(chosen).toEqual(new Set([0, 1]));
+});
+
 it("tells where a replay parts", () => {
   const game = play();
   const states = new Float64Array([0, 0, 0, 0, 0, 0.2, 0, 0]);

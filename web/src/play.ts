@@ -2,6 +2,7 @@
 import { type CartPole, cartBodies, dataAtZero, pushOf } from "./cartpole";
 import type { TaskData } from "./data";
 import type { Mujoco } from "./engine";
+import { Gap } from "./gap";
 import type { Look, Policy } from "./policy";
 import type { Pull } from "./pull";
 import { drawnStart, endingOf, hasDiverged, type Integrator, Simulation } from "./simulation";
@@ -26,6 +27,10 @@ export class Play {
   /** Whether the time limit ends an episode of the table. */
   timed = false;
   best = 0;
+  /** What lies between the table and the model. */
+  gap = new Gap();
+  /** What the table sees of the state. */
+  private seen: number[] = [];
   private due = 0;
   private readonly rail: Vector;
 
@@ -48,12 +53,14 @@ export class Play {
   }
 
   get look(): Look {
-    return this.policy.look(this.state);
+    return this.policy.look(this.seen);
   }
 
   /** Start again, from a state or from a drawn one. */
   restart(state: number[] = drawnStart(this.task)): void {
     this.simulation.state = state;
+    this.gap.forget();
+    this.seen = this.gap.seen(state);
     this.steps = this.due = this.rivalSteps = 0;
     this.ending = this.rivalEnding = null;
     this.rival?.delete();
@@ -84,7 +91,8 @@ export class Play {
   /** Take one control step. */
   step(): void {
     if (this.ending === null) {
-      this.stepWith(this.simulation, this.control(), true);
+      this.stepWith(this.simulation, this.arriving(), true);
+      this.seen = this.gap.seen(this.state);
       this.steps += 1;
       this.ending = this.endingAfter(this.simulation, this.steps);
       if (this.player === "you") this.best = Math.max(this.best, this.steps);
@@ -101,6 +109,12 @@ export class Play {
     const { controls } = this.cartpole;
     if (this.player === "table") return controls[this.look.action];
     return this.keys === 0 ? 0 : controls[this.keys > 0 ? 1 : 0];
+  }
+
+  /** Return the control that the motor gets in this step: the table's may be late. */
+  private arriving(): number {
+    const [left, right] = this.cartpole.controls;
+    return this.player === "you" ? this.control() : this.gap.arriving(this.control(), (left + right) / 2);
   }
 
   private stepWith(simulation: Simulation, control: number, isMine: boolean): void {

@@ -2,11 +2,14 @@
 import { Vector2, WebGLRenderer } from "three";
 import { button, choice, make, wantsStillness } from "./dom";
 import type { Mujoco } from "./engine";
+import { Gap } from "./gap";
 import type { Play, Ending } from "./play";
 import { Pull } from "./pull";
 import { Scene } from "./scene";
 
 const SPEEDS: [string, string][] = [["1", "real time"], ["0.5", "half speed"], ["0.2", "a fifth"], ["0.05", "a twentieth"]];
+const DELAYS: [string, string][] = [["0", "none"], ...[1, 2, 3, 4, 5, 6].map((n): [string, string] => [`${n}`, n === 1 ? "1 step" : `${n} steps`])];
+const NOISES: [string, string][] = [["0", "none"], ["0.01", "0.01"], ["0.03", "0.03"], ["0.1", "0.1"], ["0.2", "0.2"]];
 const AFTER_THE_END = 1.4;
 const WORDS: Record<Ending, string> = {
   cart: "the cart left the track",
@@ -34,6 +37,7 @@ export class Stage {
   private readonly renderer: WebGLRenderer;
   private readonly said = make("p", { class: "said", role: "status", "aria-live": "polite" });
   private readonly score = make("div", { class: "score", hidden: true });
+  private readonly gap = new Gap();
   private readonly cameras = make("select", { "aria-label": "Camera", change: () => this.chooseCamera() });
   private readonly playButton: HTMLButtonElement;
   private readonly youButton: HTMLButtonElement;
@@ -51,7 +55,9 @@ export class Stage {
       button("Restart", "Start again from a new state (R)", () => this.restart()), this.youButton, this.hands());
     const more = make("div", { class: "bar" },
       make("p", { class: "hint" }, "Drag the pole or the cart; arrow keys push."),
-      speed, make("label", { class: "choice" }, make("span", {}, "Camera"), this.cameras));
+      speed, choice("Delay of the table's pushes", DELAYS, (value) => { this.gap.delay = Number(value); }),
+      choice("Noise of what it sees", NOISES, (value) => { this.gap.noise = Number(value); }),
+      make("label", { class: "choice" }, make("span", {}, "Camera"), this.cameras));
     const view = make("div", { class: "view" }, this.canvas, this.score, this.said);
     this.element = make("div", { class: "stage" }, view, bar, more);
     this.listen();
@@ -73,6 +79,7 @@ export class Stage {
   show(play: Play): void {
     const before = this.play as Play | undefined;
     this.play = play;
+    play.gap = this.gap;
     if (before) play.best = before.best;
     this.dress();
     before?.delete();
