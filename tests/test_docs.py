@@ -65,6 +65,7 @@ NOT_HERE = {
 SCALED = {
     r"(?<=benchmarks/learners.py)(.* --seeds) \d+": r"\1 1",
     r"(?<=benchmarks/methods.py)(.* --seeds) \d+ --plot \S+": r"\1 1 --methods sarsa",
+    r"(?<=benchmarks/robustness.py)(.* --seeds) \d+": r"\1 1",
     r"(?<=^mjcartpole train --backend gym --seeds) 2000": " 2",
     r"(?<=--episodes 20000)(.* --seeds) 10": r"\1 1",
     r"--starts \d+$": "--starts 50",
