@@ -12,7 +12,7 @@ from mjcartpole.learning.documents import CONFIG
 from mjcartpole.learning.naming import in_flags, namesakes
 from mjcartpole.learning.run_model import check_storable
 from mjcartpole.learning.session import check_interval
-from mjcartpole.learning.training import training_grid
+from mjcartpole.learning.training_grid import training_grid
 from mjcartpole.media import plots
 from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.playable import why_unplayable

@@ -18,7 +18,8 @@ from mjcartpole.learning.engine import Engine, choose_engine
 from mjcartpole.learning.evaluation import evaluate_where_trained
 from mjcartpole.learning.run_model import check_storable
 from mjcartpole.learning.session import CHECKPOINT_EVERY, Session
-from mjcartpole.learning.training import Training, training_grid
+from mjcartpole.learning.training import Training
+from mjcartpole.learning.training_grid import training_grid
 from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.load import load_model, load_named
 from mjcartpole.studies import multi_seed_runs

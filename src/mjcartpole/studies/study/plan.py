@@ -13,7 +13,7 @@ from mjcartpole.learning.checkpoints import checksum
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.engine import Engine, choose_engine
 from mjcartpole.learning.run_model import check_storable
-from mjcartpole.learning.training import training_grid
+from mjcartpole.learning.training_grid import training_grid
 from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.studies.multi_seed import SeedJob
 from mjcartpole.studies.study.design import Point, points_of

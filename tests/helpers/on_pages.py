@@ -1,0 +1,28 @@
+"""Commands on the pages of the documentation that a test does not run as they stand."""
+
+NOT_HERE = {
+    "make page": "it loads packages from an index",
+    "make test": "it is the suite that this test belongs to",
+    '.venv/bin/python -m pytest -q -m "not slow"': "it is the suite that this test belongs to",
+    "python3 -m venv .venv": "the test brings an environment that is set up",
+    ".venv/bin/pip install -e '.[dev]'": "it loads packages from an index",
+    "pip install 'mjcartpole[tensorboard]'": "it loads packages from an index",
+    "pip install 'mjcartpole[plot]'": "it loads packages from an index",
+    "pip install 'mjcartpole[dask]'": "it loads packages from an index",
+    "mjcartpole study docs/study.toml --scheduler tcp://127.0.0.1:8786": "it needs a scheduler",
+}
+"""Commands that are not run, and why."""
+
+SCALED = {
+    r"(?<=benchmarks/learners.py)(.* --seeds) \d+": r"\1 1",
+    r"(?<=benchmarks/methods.py)(.* --seeds) \d+ --plot \S+": r"\1 1 --methods sarsa",
+    r"(?<=benchmarks/robustness.py)(.* --seeds) \d+": r"\1 1",
+    r"(?<=^mjcartpole train --backend gym --seeds) 2000": " 2",
+    r"(?<=--episodes 20000)(.* --seeds) 10": r"\1 1",
+    r"--starts \d+$": "--starts 50",
+    r"^make bench$": "make bench ARGS=--quick",
+    r"(?<=^python -m benchmarks.bench) (?=--json)": " --quick --only start ",
+    r"(?<=--speed 0.25) (?=-o slow.webp)": " --size 160x120 ",
+    r"for _ in range\(5\)": "for _ in range(1)",
+}
+"""What takes many minutes, by the same code over fewer seeds, repeats or pixels."""
