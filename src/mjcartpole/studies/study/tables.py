@@ -52,7 +52,8 @@ def write_tables(folder: Path, plan: Plan, found: Mapping[str, Record]) -> str:
     curves = csv_text(list(_curve_rows(plan, found)))
     write_whole(folder / RUNS, csv_text(rows))
     write_whole(folder / CURVES, curves)
-    _write_parquet(folder)
+    if rows:
+        write_parquet(folder / RUNS, folder / PARQUET)
     lasting = [{k: v for k, v in row.items() if k not in TIMES} for row in rows]
     return hashlib.sha256((csv_text(lasting) + curves).encode()).hexdigest()[:16]
 
@@ -67,16 +68,23 @@ def _curve_rows(plan: Plan, found: Mapping[str, Record]) -> Iterator[Row]:
             yield {**about, "what": "greedy", "episode": episode, "mean": mean, "minimum": least}
 
 
-def _write_parquet(folder: Path) -> None:
-    """Write the table of runs as Parquet too, where a package is installed that can."""
-    if importlib.util.find_spec("pyarrow"):
-        from pyarrow import csv, parquet  # noqa: PLC0415 - an optional package
+def write_parquet(table: Path, target: Path) -> None:
+    """Write a table as Parquet too, where a package is installed that can.
 
-        with atomic_write(folder / PARQUET) as temporary:
-            parquet.write_table(csv.read_csv(folder / RUNS), temporary)
+    Raises:
+        FileError: It cannot be written.
+    """
+    # Digits alone would else be a number.
+    if importlib.util.find_spec("pyarrow"):
+        import pyarrow  # noqa: PLC0415 - an optional package
+        from pyarrow import csv, parquet  # noqa: PLC0415
+
+        options = csv.ConvertOptions(column_types={"key": pyarrow.string()})
+        with atomic_write(target) as temporary:
+            parquet.write_table(csv.read_csv(table, convert_options=options), temporary)
     elif importlib.util.find_spec("duckdb"):
         import duckdb  # noqa: PLC0415 - an optional package
 
-        with atomic_write(folder / PARQUET) as temporary:
-            table = duckdb.connect().read_csv(str(folder / RUNS))
-            table.write_parquet(str(temporary))
+        with atomic_write(target) as temporary, duckdb.connect() as connection:
+            found = connection.read_csv(str(table), dtype={"key": "VARCHAR"})
+            found.write_parquet(str(temporary))
