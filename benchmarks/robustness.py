@@ -4,13 +4,16 @@
     python benchmarks/robustness.py delay --seeds 20
     python benchmarks/robustness.py noise --seeds 20
     python benchmarks/robustness.py push --seeds 20
+    python benchmarks/robustness.py speed
 
 Each learner is trained on --seeds seeds from --first-seed on; the greedy policy of each then plays
 100 episodes at every level, from the same starting states. Printed is the mean return over seeds,
-with its 95 % bootstrap interval; --plot FILE draws it.
+with its 95 % bootstrap interval; --plot FILE draws it. `speed` trains in turns with and without
+disturbances: the median of steps per second of CPU, compiling and making models apart.
 """
 
 import argparse
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -24,7 +27,7 @@ from mjcartpole.envs.backend import Backend
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.controllers import controller
 from mjcartpole.learning.evaluation import Player, evaluate
-from mjcartpole.learning.training import train
+from mjcartpole.learning.training import Training, train
 from mjcartpole.media.plots import plot_style, write_plot
 from mjcartpole.physics.load import load_model
 from mjcartpole.studies.statistics import bootstrap_interval
@@ -115,11 +118,14 @@ QUESTIONS = {
 def main() -> None:
     """Ask, print, and draw."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
-    parser.add_argument("question", choices=QUESTIONS)
+    parser.add_argument("question", choices=[*QUESTIONS, "speed"])
     parser.add_argument("--seeds", type=int, default=20)
     parser.add_argument("--first-seed", type=int, default=5_000)
     parser.add_argument("--plot", type=Path)
     arguments = parser.parse_args()
+    if arguments.question == "speed":
+        print_speed()
+        return
     question = QUESTIONS[arguments.question]
     seeds = range(arguments.first_seed, arguments.first_seed + arguments.seeds)
     found = {name: returns_of(question, make, seeds) for name, make in question.learners.items()}
@@ -128,6 +134,48 @@ def main() -> None:
     print_table(question, found)
     if arguments.plot:
         write_plot(plot(question, found), arguments.plot)
+
+
+FIVE = {
+    "vary": {
+        "pole.length": (0.9, 1.1),
+        "pole.mass": (0.09, 0.11),
+        "cart.mass": (0.9, 1.1),
+        "force": (9, 11),
+        "gravity": (9.5, 10),
+    },
+    "delay": 1,
+    "noise": 0.001,
+}
+ADDED: dict[str, dict[str, Any]] = {
+    "nothing": {},
+    "delay": {"delay": 1},
+    "delay and noise": {"delay": 1, "noise": 0.001},
+    "five numbers that vary, delay and noise": FIVE,
+}
+
+
+def print_speed(repeats: int = 9) -> None:
+    """Print training speeds as Markdown, and their shares of the speed without disturbances."""
+    print("| backend | what is added | M steps/s | share |")
+    print("|---|---|---|---|")
+    for backend in ("mujoco", "gym"):
+        added = {name: ADDED[name] for name in ADDED if backend == "mujoco" or ADDED[name] != FIVE}
+        speeds = [[speed(backend, each) for each in added.values()] for _ in range(repeats)]
+        medians = np.median(speeds[1:], axis=0)
+        for name, median in zip(added, medians, strict=True):
+            print(f"| {backend} | {name} | {median:.2f} | {median / medians[0]:.2f} |")
+
+
+def speed(backend: str, added: dict[str, Any]) -> float:
+    """Return millions of steps per second of CPU, of one training."""
+    training = Training(TrainConfig(backend=backend, seed=1, **added))
+    run = training.run()
+    next(run)
+    done, started = training.result().steps, time.process_time()
+    for _ in run:
+        pass
+    return (training.result().steps - done) / (time.process_time() - started) / 1e6
 
 
 def returns_of(
