@@ -9,6 +9,7 @@ import pytest
 
 from mjcartpole.disturbances.disturbances import Disturbances, WorldDisturbances
 from mjcartpole.errors import ConfigError, ModelError
+from mjcartpole.learning.controllers import controller
 from mjcartpole.learning.discretizer import Discretizer
 from mjcartpole.learning.evaluation import evaluate
 from mjcartpole.learning.naming import added_flags
@@ -216,3 +217,11 @@ def test_what_a_notebook_shows_is_short():
     swept = sweep(POLICY, "cartpole", "gravity", [9.0, 9.5, 10.0], episodes=1, seed=4)
     played = "TransferResult(policies: 1, models: 3, seed 4)"
     assert repr(swept) == f"SweepResult(gravity from 9 to 10 on cartpole, values: 3, {played})"
+
+
+@pytest.mark.parametrize(
+    ("key", "meant"), [("dealy", "delay"), ("pusch@2s", "push"), ("pole.lenght", "pole.length")]
+)
+def test_a_slip_is_told_by_what_is_nearest(key, meant):
+    with pytest.raises(ConfigError, match=f"did you mean '{meant}'"):
+        sweep({"constant": controller("constant")}, "cartpole", key, (1, 2), episodes=1)

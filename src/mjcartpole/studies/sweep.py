@@ -11,10 +11,10 @@ import numpy as np
 import numpy.typing as npt
 
 from mjcartpole.disturbances.disturbances import NONE, Disturbances
-from mjcartpole.errors import ConfigError
+from mjcartpole.errors import ConfigError, nearest
 from mjcartpole.integrator import Integrator
 from mjcartpole.learning.evaluation import EPISODES, SEED, Player, check_count
-from mjcartpole.physics.edit.edits import edits_of
+from mjcartpole.physics.edit.edits import EDIT_NAMES, edits_of
 from mjcartpole.physics.load import Edits, ModelLike, load_model
 from mjcartpole.studies.transfer import GYM, Cell, TransferResult, find_place, transfer
 from mjcartpole.task import CARTPOLE_V1, Task
@@ -194,11 +194,15 @@ def sweep(
     check_count(episodes, seed)
     others, word = edits_of(edits or ()), key.replace("-", "_")
     is_disturbance = word.partition("@")[0] in DISTURBANCES
+    near = nearest(word.partition("@")[0], [*DISTURBANCES, *EDIT_NAMES])
     if model == GYM and (others or own_timestep or not is_disturbance):
         raise ConfigError(
             "gymnasium's CartPole-v1 cannot be swept or edited, but for disturbances; give a "
             "model, as 'cartpole'"
         )
+    # A slip is told by what is nearest of all that can be swept.
+    if not is_disturbance and near and near[0] in DISTURBANCES:
+        raise ConfigError(f"nothing to sweep is called {key!r}: did you mean {near[0]!r}?")
     varying = [each.name for each in disturbances.ranges]
     key = word if is_disturbance else key
     _check(key, values, {*others, *disturbances.given, *varying})
