@@ -91,7 +91,7 @@ def _disturbances(draw, method, backend, mirror):
     if method not in ("planning", "identify"):
         some |= {"observe_actions": st.integers(1, 3)}
     chosen = draw(st.lists(st.sampled_from(sorted(some)), min_size=1, max_size=4, unique=True))
-    varied = {"vary": ("pole.length=0.6:1.4",), "pool": 2, "widen": 5}
+    varied = {"vary": ("force=8:12",), "pool": 2, "widen": 5}
     more = varied if backend == "mujoco" and draw(st.booleans()) else {}
     return {name: draw(some[name]) for name in chosen} | more
 

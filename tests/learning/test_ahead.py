@@ -3,11 +3,11 @@
 import numba
 import numpy as np
 
-from mjcartpole.learning import ahead, compiled, stepping
+from mjcartpole.learning import ahead, compiled, kinds, stepping
 from mjcartpole.task import CARTPOLE_V1
 
 RULES = compiled._rules(CARTPOLE_V1)
-GYM = stepping.GymPhysics(-10.0, 10.0, 0.0)
+GYM = kinds.GymPhysics(-10.0, 10.0, 0.0)
 
 
 @numba.njit(error_model="numpy")
