@@ -259,3 +259,11 @@ def test_what_is_edited_for_an_episode_is_not_drawn() -> None:
     assert (env.unwrapped.length, env.unwrapped.gravity) == (0.625, 3.7)
     assert env.reset(seed=0)[1]["context"]["pole.length"] != 1.25
     assert env.unwrapped.gravity == 9.8
+
+
+def test_names_of_a_vector_are_those_of_each_environment() -> None:
+    many = gymnasium.make_vec(ID, num_envs=3, vary=LENGTHS).unwrapped
+    context = many.reset(seed=2)[1]["context"]
+    assert many.length == tuple(context["pole.length"] / 2)
+    assert many.masscart == tuple(context["cart.mass"])
+    assert gymnasium.make_vec(ID, num_envs=3, delay=1).unwrapped.length == 0.5

@@ -119,7 +119,8 @@ def what_happened(casts: Casts) -> str:
     if len(takes) == 1:
         return f"{counted(takes[0].episode.steps, 'step')}, {takes[0].episode.ending}{added}"
     steps = [take.episode.steps for take in takes]
-    return f"{len(takes)} episodes of {min(steps)} to {max(steps)} steps{added}"
+    span = f"{min(steps)} to " if min(steps) < max(steps) else ""
+    return f"{len(takes)} episodes of {span}{max(steps)} steps{added}"
 
 
 def write_sheet(casts: Casts, look: VideoOptions, path: Path, signals: StopSignals) -> None:

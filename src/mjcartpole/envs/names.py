@@ -261,7 +261,10 @@ class CartPoleNames:
 
 
 class FixedNames:
-    """CartPole-v1's names of many environments: read only, since edits are made at the start."""
+    """CartPole-v1's names of many environments: read only, since edits are made at the start.
+
+    Where models vary there is one number for each environment.
+    """
 
     cartpole: CartPole
     _task: Task
@@ -274,6 +277,9 @@ class FixedNames:
     def __getattr__(self, name: str) -> Any:  # noqa: ANN401 - any of several
         number = vars(CartPoleNames).get(name)
         if isinstance(number, Number):
+            disturbers = self.__dict__.get("_disturbers")
+            if disturbers is not None and disturbers.vary:
+                return tuple(map(number.read, disturbers.cartpoles))
             return number.read(self.cartpole)
         if name in _LIMITS:
             return getattr(self._task, _LIMITS[name])
