@@ -165,6 +165,7 @@ def test_public_names():
         "CartPole",
         "CartPoleEnv",
         "CartPoleVectorEnv",
+        "Disturbances",
         "ENV_ID",
         "Evaluation",
         "ManyResult",

@@ -18,6 +18,7 @@ from mjcartpole.envs.registration import ENV_ID, register, register_task
 from mjcartpole.task import Task
 
 if TYPE_CHECKING:
+    from mjcartpole.disturbances.disturbances import Disturbances
     from mjcartpole.envs.cartpole import CartPoleEnv
     from mjcartpole.envs.vector import CartPoleVectorEnv
     from mjcartpole.learning.config import TrainConfig
@@ -38,6 +39,7 @@ __all__ = [
     "CartPole",
     "CartPoleEnv",
     "CartPoleVectorEnv",
+    "Disturbances",
     "Evaluation",
     "ManyResult",
     "Policy",
@@ -58,6 +60,7 @@ _HOMES = {
     "CartPole": "physics.cartpole",
     "CartPoleEnv": "envs.cartpole",
     "CartPoleVectorEnv": "envs.vector",
+    "Disturbances": "disturbances.disturbances",
     "Evaluation": "learning.evaluation",
     "ManyResult": "studies.seeds",
     "Policy": "learning.policy",

@@ -91,3 +91,9 @@ def test_a_flag_that_is_yes_no_or_left_to_what_is_found(words, mirror):
 def test_what_is_neither_yes_nor_no():
     with pytest.raises(UsageError, match="--mirror: 'maybe' is neither yes nor no"):
         parse(["train", "--mirror", "maybe"])
+
+
+def test_a_list_has_a_value():
+    for flag in ("--push", "--set", "--noise"):
+        with pytest.raises(UsageError, match="a value is missing"):
+            parse(["train", flag])

@@ -59,7 +59,9 @@ def test_zeros_are_as_good_as_nothing(name: str) -> None:
         ({"observe_actions": 9}, "from 0 to 8"),
         ({"hold": 1.1}, "hold must be from 0 to 1"),
         ({"drop": -0.1}, "drop must be from 0 to 1"),
-        ({"lag": float("nan")}, "lag must be a number"),
+        ({"lag": float("nan")}, "lag must be from 0"),
+        ({"quantize": 1e-9}, "quantize must be 0, or 1e-06 or more"),
+        ({"hold": float("nan")}, "hold must be from 0 to 1"),
         ({"force_noise": -1}, "force_noise must be from 0"),
         ({"noise": -0.1}, "noise must be 0 or more"),
         ({"noise": (1, 2)}, "one each for x, x_dot, theta, theta_dot"),
@@ -97,3 +99,18 @@ def test_what_tells_left_from_right() -> None:
     assert Disturbances(bias=0.1).one_sided == "bias"
     assert Disturbances(push="1@2s").one_sided == "push"
     assert not Disturbances(push="1@~2s", noise=0.1, delay=2).one_sided
+
+
+def test_nothing_is_a_word_for_ranges_and_shoves() -> None:
+    some = Disturbances(push="1@2s", vary="force=8:12")
+    assert dataclasses.replace(some, push="none", vary=("none",)) == NONE
+
+
+def test_what_is_taken_from_other_settings() -> None:
+    settings: dict[str, Any] = {"delay": 2, "noise": None, "x_limit": 1.0}
+    assert Disturbances.taken_from(settings, {"lag": 0.1}) == Disturbances(delay=2, lag=0.1)
+    assert settings == {"x_limit": 1.0}
+    with pytest.raises(TypeError, match="'delya'; did you mean 'delay'"):
+        Disturbances.taken_from({"delya": 1})
+    with pytest.raises(ConfigError, match="disturbances are a mapping"):
+        Disturbances.taken_from({}, 3)  # type: ignore[arg-type]

@@ -199,6 +199,8 @@ def test_a_step_needs_a_reset() -> None:
         ({"vary": {"pole.length": (-1, 2)}}, "more than 0"),
         ({"vary": {"timestep": (0.001, 0.0301)}}, "does not divide"),
         ({"noise": -1}, "0 or more"),
+        ({"vary": {"timestep": (0.01, 0.02)}}, "does not divide"),
+        ({"vary": {"force": (8, 12)}, "edits": {"force": 9}}, "is set, and varies"),
         ({"delay": 500}, "no shorter than an episode"),
         ({"disturbances": {"dealy": 2}}, "did you mean 'delay'"),
         ({"disturbances": {"delay": 2}, "delay": 1}, "give one"),
@@ -267,3 +269,9 @@ def test_names_of_a_vector_are_those_of_each_environment() -> None:
     assert many.length == tuple(context["pole.length"] / 2)
     assert many.masscart == tuple(context["cart.mass"])
     assert gymnasium.make_vec(ID, num_envs=3, delay=1).unwrapped.length == 0.5
+
+
+def test_a_delay_is_held_against_the_length_of_a_vectors_episodes() -> None:
+    gymnasium.make_vec(ID, max_episode_steps=1_000, delay=600)
+    with pytest.raises(ConfigError, match="no shorter than an episode"):
+        gymnasium.make_vec(ID, max_episode_steps=10, delay=10)

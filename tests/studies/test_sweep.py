@@ -136,11 +136,11 @@ def test_what_can_be_swept_is_what_can_be_added(name):
     [
         ("delay", (0.0, 0.5), {}, "delay must be a whole number"),
         ("delay", (1.0, 500.0), {}, "no shorter than an episode"),
-        ("delay", (0.0, 1.0), {"delay": 1}, "set and swept; give it once"),
+        ("delay", (0.0, 1.0), {"delay": 1}, "given and swept; give it once"),
         ("drop", (0.0, 1.5), {}, "drop must be from 0 to 1"),
         ("push", (0.0, 1.5), {}, "says when, such as push@2s=0:5:0.5"),
         ("push@99s", (0.0, 1.5), {}, "comes after the end of every episode"),
-        ("pole.length", (1.0, 1.5), {"vary": "pole.length=1:2"}, "set and swept"),
+        ("pole.length", (1.0, 1.5), {"vary": "pole.length=1:2"}, "given and swept"),
         ("lag", (0.0, 1.0), {"vary": "pole.length=-1:2"}, "cannot be"),
     ],
 )

@@ -73,17 +73,25 @@ def test_the_summary_is_plain(matrix):
     assert first["time limit"] + first["off the track"] + first["pole fell"] == 20
 
 
-def test_disturbances_are_added_everywhere_but_gymnasiums_model_does_not_vary():
-    some = {"delay": 1, "noise": 0.05}
-    varied = Disturbances(**some, vary="pole.length=0.5:2", pool=3)
-    found = transfer(POLICIES, ["gym", "cartpole"], disturbances=varied, episodes=5, seed=3)
+@pytest.mark.parametrize("more", [{}, {"vary": "pole.length=0.5:2", "pool": 3}])
+def test_disturbances_are_added_everywhere(more):
+    added = Disturbances(delay=1, noise=0.05, **more)
+    models = ["cartpole"] if more else ["gym", "cartpole"]
+    found = transfer(POLICIES, models, disturbances=added, episodes=5, seed=3)
     for cell in found.cells:
         where = {"backend": "gym"} if cell.place == "gym" else {"model": cell.place}
-        added = Disturbances(**some) if cell.place == "gym" else varied
         alone = evaluate(POLICIES[cell.policy], disturbances=added, episodes=5, seed=3, **where)
         assert cell.evaluation == alone
     said = "--vary pole.length=0.5:2 --delay 1 --noise 0.05 --pool 3"
-    assert found.summary()["disturbances"] == said
+    assert found.summary()["disturbances"] == (said if more else "--delay 1 --noise 0.05")
+
+
+def test_what_varies_is_for_models_that_can():
+    varied = Disturbances(vary="pole.length=0.5:2")
+    with pytest.raises(ConfigError, match="leave out gym among the models, or vary"):
+        transfer(POLICIES, ["gym"], disturbances=varied)
+    with pytest.raises(ConfigError, match=r"'pole.length' is set, and varies"):
+        find_place("cartpole", {"pole.length": 2}, disturbances=varied)
 
 
 @pytest.mark.parametrize(

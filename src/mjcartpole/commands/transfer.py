@@ -71,7 +71,8 @@ class Transfer(RuleChanges, DisturbanceChanges, Command):
         from mjcartpole.studies.plots import heat_map
         from mjcartpole.studies.transfer import GYM, find_place, transfer
 
-        chosen = dict.fromkeys(self.models or _fitting(policies))
+        fitting = [name for name in _fitting(policies) if name != GYM or not self.vary]
+        chosen = dict.fromkeys(self.models or fitting)
         if set(chosen) == {GYM} and (self.set or self.own_timestep or self.vary):
             raise ConfigError(
                 "gym is gymnasium's own cart-pole: --set, --own-timestep and --vary change nothing "

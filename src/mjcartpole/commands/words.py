@@ -51,7 +51,7 @@ def _gathered(words: Sequence[str], flag: str, sign: str) -> list[str]:
         else:
             follows = False
             others.append(word)
-    return [*others, flag, *values] if values else others
+    return others if len(others) == len(words) else [*others, flag, *values]
 
 
 def value_of(flag: str, words: Sequence[str], otherwise: str) -> str:
@@ -75,9 +75,7 @@ def _list_rule(info: PrimitiveTypeInfo) -> PrimitiveConstructorSpec[Any] | None:
     return PrimitiveConstructorSpec(
         nargs="*",
         metavar="[{0} [{0} ...]]".format(kind.__name__.upper()),
-        instance_from_str=lambda words: tuple(
-            _read(kind, v) for word in words for v in _values(word)
-        ),
+        instance_from_str=lambda words: _read_all(kind, words),
         is_instance=lambda value: isinstance(value, tuple),
         str_from_instance=lambda values: list(map(str, values)),
     )
@@ -100,6 +98,13 @@ def _read_yes_or_no(word: str = "yes") -> bool:
     if word not in _YES_OR_NO:
         raise ValueError(f"'{word}' is neither yes nor no")
     return _YES_OR_NO[word]
+
+
+def _read_all(kind: Any, words: Sequence[str]) -> tuple[Any, ...]:  # noqa: ANN401 - one of three
+    found = tuple(_read(kind, value) for word in words for value in _values(word))
+    if not found:
+        raise ValueError("a value is missing")
+    return found
 
 
 def _read(kind: Any, text: str) -> Any:  # noqa: ANN401 - one of three

@@ -15,11 +15,14 @@ from typing import TYPE_CHECKING, Any, Final, Self
 import numpy as np
 
 from mjcartpole.disturbances.effects import QUEUE, Effects
-from mjcartpole.disturbances.ranges import Range, parse_ranges
+from mjcartpole.disturbances.ranges import NOTHING, Range, parse_ranges
 from mjcartpole.disturbances.shoves import LARGEST, Shove, parse_shove
-from mjcartpole.errors import ConfigError, check_known
-from mjcartpole.rules import MOST_STEPS
+from mjcartpole.errors import ConfigError, check_known, nearest
+from mjcartpole.rules import MOST_STEPS, RULES
 from mjcartpole.task import Task, state_names
+
+SMALLEST_STEP: Final = 1e-6
+"""Of a converter: a state is then a whole number of steps that both engines know."""
 
 MOST_SHARE: Final = 1.0
 """Chances are shares of all control steps."""
@@ -146,12 +149,31 @@ class Disturbances(WorldDisturbances):
         """
         names = [field.name for field in dataclasses.fields(Disturbances)]
         own = {name: settings.pop(name) for name in names if name in settings}
+        own = {name: value for name, value in own.items() if value is not None}
+        for name in settings:
+            if name not in RULES and (near := nearest(name, [*names, *RULES])):
+                raise TypeError(
+                    f"got an unexpected keyword argument {name!r}; did you mean {near[0]!r}?"
+                )
+        if not isinstance(given, Disturbances | Mapping | None):
+            raise ConfigError(f"disturbances are a mapping or Disturbances(…), not {given!r}")
         known = dict(given.given if isinstance(given, Disturbances) else given or {})
         if both := [name for name in own if name in known]:
             raise ConfigError(f"{both[0]} is given by itself and in disturbances; give one")
         for name in known:
             check_known("disturbance", name, names)
         return Disturbances(**known, **own)
+
+    def check_apart(self, edits: Iterable[str]) -> None:
+        """Refuse numbers that are edited and vary: the edit would have no effect.
+
+        Raises:
+            ConfigError: See above.
+        """
+        varied = {each.name for each in self.ranges}
+        for name in edits:
+            if name in varied:
+                raise ConfigError(f"{name!r} is set, and varies; give it once")
 
     def seen_by(self, actions: int) -> Self:
         """Return the same where so many actions before are seen."""
@@ -184,7 +206,8 @@ class Disturbances(WorldDisturbances):
             if getattr(self, name) >= task.time_limit:
                 raise ConfigError(
                     f"{name} of {getattr(self, name)} control steps is no shorter than an episode "
-                    f"of {task.name}, which has {task.time_limit}"
+                    f"of {task.name}, which has {task.time_limit}; take a shorter one, or a task "
+                    "with longer ones: with_changes(max_episode_steps=…)"
                 )
 
     def effects(self, poles: int, control_step: float, task: Task) -> tuple["Effects", list[float]]:
@@ -237,7 +260,8 @@ _SIZES: Final = {
 
 
 def _parse_shoves(pushes: object) -> tuple[Shove, ...]:
-    return tuple(parse_shove(each) for each in _several(pushes))
+    texts = _several(pushes)
+    return () if texts == (NOTHING,) else tuple(parse_shove(each) for each in texts)
 
 
 def _several(values: object) -> tuple[Any, ...]:
@@ -253,22 +277,25 @@ def _check_count(name: str, value: object, most: int) -> None:
 
 
 def _size(name: str, value: Any, unit: str, most: float) -> float:  # noqa: ANN401 - to be checked
-    number = _number(name, value)
+    number = _as_float(value)
     if not 0 <= number <= most:
         raise ConfigError(f"{name} must be from 0 to {most:,g} ({unit}), not {value!r}")
     return number
 
 
-def _number(name: str, value: Any) -> float:  # noqa: ANN401 - to be checked
+def _as_float(value: Any) -> float:  # noqa: ANN401 - to be checked
+    """Return a number, NaN where it is none."""
     try:
-        if isinstance(value, bool | str):
-            raise TypeError
-        number = float(value)
+        return math.nan if isinstance(value, bool | str) else float(value) + 0.0
     except (TypeError, ValueError, OverflowError):
-        number = math.nan
+        return math.nan
+
+
+def _number(name: str, value: Any) -> float:  # noqa: ANN401 - to be checked
+    number = _as_float(value)
     if not abs(number) <= LARGEST:
         raise ConfigError(f"{name} must be a number up to {LARGEST:,g}, not {value!r}")
-    return number + 0.0
+    return number
 
 
 def _truth(name: str, value: object) -> bool:
@@ -288,6 +315,8 @@ def _values(name: str, values: object) -> tuple[float, ...]:
         )
     if name != "bias" and min(numbers, default=0.0) < 0:
         raise ConfigError(f"{name} must be 0 or more, not {values!r}")
+    if name == "quantize" and any(0 < number < SMALLEST_STEP for number in numbers):
+        raise ConfigError(f"quantize must be 0, or {SMALLEST_STEP:g} or more, not {values!r}")
     return numbers if any(numbers) else ()
 
 

@@ -10,6 +10,10 @@ LOG: Final = "log"
 """The word for a range whose logarithm is uniform."""
 
 
+NOTHING: Final = "none"
+"""The word for no range, where there were some."""
+
+
 class Range(NamedTuple):
     """What one number of a model is drawn from.
 
@@ -68,7 +72,7 @@ def parse_ranges(ranges: object) -> tuple[Range, ...]:
         found = tuple(_from_value(name, value) for name, value in ranges.items())
     else:
         texts = [ranges] if isinstance(ranges, str) or not isinstance(ranges, Iterable) else ranges
-        found = tuple(_from_text(text) for text in texts)
+        found = () if list(texts) == [NOTHING] else tuple(_from_text(text) for text in texts)
     names = [each.name for each in found]
     for name in names:
         if names.count(name) > 1:

@@ -68,6 +68,6 @@ def parse_shove(text: object) -> Shove:
     if not at or not limits or (is_random and not numbers[1]):
         raise ConfigError(
             f"push {text!r} is none; give N s @ seconds, such as 0.5@2s at two seconds, or 0.5@~4s "
-            "at random, once in four seconds on average"
+            f"at random, once in four seconds on average; up to {LARGEST:g} each"
         )
     return Shove(numbers[0], *((None, numbers[1]) if is_random else (numbers[1], None)))

@@ -25,6 +25,7 @@ from mjcartpole.media.renderer import DEFAULT_HEIGHT, DEFAULT_WIDTH
 from mjcartpole.media.scene import DEFAULT_CAMERA
 from mjcartpole.physics.bodies import starting_state
 from mjcartpole.physics.cartpole import CartPole
+from mjcartpole.physics.edit.edits import edits_of
 from mjcartpole.physics.load import Edits, ModelLike, load_shared
 from mjcartpole.physics.simulation import FARTHEST_SANE, Simulation, State, as_seen, check_sane
 from mjcartpole.rewards import CONSTANT
@@ -186,6 +187,7 @@ class CartPoleEnv(
         # Made when it is first needed: it takes several times as long as all the rest.
         self._simulation: Simulation | None = None
         added = Disturbances.taken_from(more, disturbances)
+        added.check_apart(edits_of(edits or ()))
         self._task = rules_of(task, cast(Changes, more), sutton_barto_reward=sutton_barto_reward)
         self.disturber = Disturber.where_needed(added, cartpole, self._task)
         self._observation = observation

@@ -21,9 +21,10 @@ from mjcartpole.envs.observations import Observation, with_cosines
 from mjcartpole.errors import ConfigError, check_known
 from mjcartpole.physics.bodies import starting_state
 from mjcartpole.physics.cartpole import CartPole
+from mjcartpole.physics.edit.edits import edits_of
 from mjcartpole.physics.load import Edits, ModelLike, load_model
 from mjcartpole.physics.variants import variant
-from mjcartpole.rules import Changes
+from mjcartpole.rules import MOST_STEPS, Changes
 from mjcartpole.task import (
     CARTPOLE_V1,
     CONTROL_STEP,
@@ -209,7 +210,9 @@ class DisturbedBalance(Balance):
 
     def __init__(self, cartpole: CartPole, disturbances: Disturbances, **settings: Any) -> None:  # noqa: ANN401
         super().__init__(cartpole, **settings)
-        self.disturber = Disturber(disturbances, cartpole, self._rules)
+        steps = int(min(self._limit, MOST_STEPS))
+        limited = self._rules.with_changes(max_episode_steps=steps)
+        self.disturber = Disturber(disturbances, cartpole, limited)
         self._base, self._own_controls = cartpole, cartpole.controls
         self._seen: tuple[int, npt.NDArray[np.float64]] | None = None
 
@@ -306,6 +309,7 @@ def load(
     known = {BALANCE: CARTPOLE_V1, **TASKS}
     check_known("task", task_name, known)
     added = Disturbances.taken_from(more, disturbances)
+    added.check_apart(edits_of(edits or ()))
     task = known[task_name].with_changes(**cast(Changes, more))
     if time_limit is None:
         time_limit = task.time_limit * CONTROL_STEP

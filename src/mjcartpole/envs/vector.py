@@ -23,6 +23,7 @@ from mjcartpole.media.renderer import DEFAULT_HEIGHT, DEFAULT_WIDTH, open_render
 from mjcartpole.media.scene import DEFAULT_CAMERA, check_picture
 from mjcartpole.physics.batch_simulation import BatchSimulation
 from mjcartpole.physics.bodies import starting_state
+from mjcartpole.physics.edit.edits import edits_of
 from mjcartpole.physics.load import Edits, ModelLike, load_model
 from mjcartpole.rewards import CONSTANT
 from mjcartpole.rules import Changes
@@ -156,6 +157,7 @@ class CartPoleVectorEnv(
         """
         self.num_envs = _count("num_envs", num_envs)
         added = Disturbances.taken_from(more, disturbances)
+        added.check_apart(edits_of(edits or ()))
         self._task = rules_of(task, cast(Changes, more), sutton_barto_reward=sutton_barto_reward)
         self._observation = observation
         steps = self._task.time_limit if max_episode_steps is None else max_episode_steps
@@ -174,7 +176,8 @@ class CartPoleVectorEnv(
             observation_space(self._task, self.cartpole.poles, observation),
         )
         if added.are_some:
-            self._disturbers = Disturbers(added, self.cartpole, self._task, self.num_envs)
+            limited = self._task.with_changes(max_episode_steps=self.max_episode_steps)
+            self._disturbers = Disturbers(added, self.cartpole, limited, self.num_envs)
             controls, space = (-1.0, 1.0), self._disturbers.members[0].space(space)
         self.single_observation_space = space
         self.single_action_space = action_space(self._task)

@@ -281,11 +281,9 @@ class TrainConfig(RuleChanges):
         return dataclasses.replace(Disturbances.of(self), widen=0)
 
     def _check_disturbances(self) -> None:
-        varied = {each.partition("=")[0] for each in self.vary}
-        for name in (each.partition("=")[0].strip() for each in self.set):
-            if name in varied:
-                raise ConfigError(f"{name!r} is set, and varies; give it once")
-        Disturbances.of(self).check_fits(self.rules)
+        own = Disturbances.of(self)
+        own.check_apart(each.partition("=")[0].strip() for each in self.set)
+        own.check_fits(self.rules)
         method = method_named(self.method)
         if self.observe_actions and (hasattr(method, "plan") or hasattr(method, "imagine")):
             raise ConfigError(

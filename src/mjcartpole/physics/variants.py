@@ -42,7 +42,9 @@ def contexts_of(base: CartPole, disturbances: Disturbances) -> Contexts:
     """
     ranges = disturbances.ranges
     for each in ranges:
-        for end in {each.bounds[0], each.bounds[-1]} if each.kind != "choice" else each.bounds:
+        # The ends and two places within: what divides a control step, say, not all between do.
+        shares = () if each.kind == "choice" else (0.382, 0.5)
+        for end in dict.fromkeys((*each.bounds, *map(each.at, shares))):
             try:
                 variant(base, {each.name: end})
             except (ConfigError, ModelError) as error:

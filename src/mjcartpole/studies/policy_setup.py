@@ -19,6 +19,7 @@ from mjcartpole.learning.naming import added_flags
 from mjcartpole.learning.policy import Policy
 from mjcartpole.media.plots import short
 from mjcartpole.physics.cartpole import CartPole
+from mjcartpole.physics.edit.edits import edits_of
 from mjcartpole.physics.load import ModelLike, load_model
 from mjcartpole.studies import multi_seed_runs
 from mjcartpole.studies.eval_target import EvalTarget
@@ -137,6 +138,7 @@ def _placed(
     evaluation.check_count(1, seed)
     backend = target.backend or config.backend
     disturbances = _disturbances(config, target, backend).seen_by(policy.actions)
+    disturbances.check_apart(edits_of(target.set))
     own_model = str(run.model) if run else config.model
     if backend == "gym":
         # Gymnasium's cart-pole has neither; only what the user asks for is held against that.

@@ -243,6 +243,6 @@ def _disturbed(others: Disturbances, key: str, value: float) -> Disturbances:
 
 def _check(key: str, values: Sequence[float], given: Container[str]) -> None:
     if key in given:
-        raise ConfigError(f"'{key}' is set and swept; give it once")
+        raise ConfigError(f"'{key}' is given and swept; give it once")
     if not values or any(a >= b for a, b in itertools.pairwise(values)):
         raise ConfigError(f"a sweep needs rising values, not {list(values)}")

@@ -16,6 +16,7 @@ from mjcartpole.integrator import Integrator
 from mjcartpole.learning.evaluation import EPISODES, SEED, Evaluation, Player, check_count, evaluate
 from mjcartpole.learning.naming import added_flags
 from mjcartpole.physics.cartpole import CartPole
+from mjcartpole.physics.edit.edits import edits_of
 from mjcartpole.physics.load import Edits, ModelLike, load_model
 from mjcartpole.physics.variants import contexts_of
 from mjcartpole.studies.statistics import Interval, bootstrap_interval
@@ -182,7 +183,12 @@ def find_place(
         ConfigError: An edit names nothing that is there, or a value is outside physics.
     """
     if model == GYM:
-        return Place(GYM, None, disturbances=disturbances.fixed)
+        if disturbances.vary:
+            raise ConfigError(
+                "gymnasium's CartPole-v1 does not vary; leave out gym among the models, or vary"
+            )
+        return Place(GYM, None, disturbances=disturbances)
+    disturbances.check_apart(edits_of(edits or ()))
     cartpole = load_model(model, edits, own_timestep=own_timestep)
     return Place(cartpole.name, cartpole, integrator, disturbances)
 
