@@ -192,24 +192,19 @@ def sweep(
         ModelError: The model cannot be used, or a value makes it one that cannot.
     """
     check_count(episodes, seed)
-    others, word = edits_of(edits or ()), key.replace("-", "_")
-    is_disturbance = word.partition("@")[0] in DISTURBANCES
-    near = nearest(word.partition("@")[0], [*DISTURBANCES, *EDIT_NAMES])
-    if model == GYM and (others or own_timestep or not is_disturbance):
+    others, disturbance = edits_of(edits or ()), _disturbance_named(key)
+    if model == GYM and (others or own_timestep or not disturbance):
         raise ConfigError(
             "gymnasium's CartPole-v1 cannot be swept or edited, but for disturbances; give a "
             "model, as 'cartpole'"
         )
-    # A slip is told by what is nearest of all that can be swept.
-    if not is_disturbance and near and near[0] in DISTURBANCES:
-        raise ConfigError(f"nothing to sweep is called {key!r}: did you mean {near[0]!r}?")
     varying = [each.name for each in disturbances.ranges]
-    key = word if is_disturbance else key
+    key = disturbance or key
     _check(key, values, {*others, *disturbances.given, *varying})
     find = functools.partial(
         find_place, integrator=integrator, own_timestep=own_timestep, disturbances=disturbances
     )
-    if is_disturbance:
+    if disturbance:
         place = find(model, others)
         swept = [_disturbed(place.disturbances, key, value) for value in values]
         name, places = place.name, [replace(place, disturbances=each) for each in swept]
@@ -226,6 +221,22 @@ def sweep(
         workers=workers,
     )
     return SweepResult(key, tuple(map(float, values)), name, played)
+
+
+def _disturbance_named(key: str) -> str:
+    """Return a disturbance as it is called here; nothing where a key is of an edit.
+
+    Raises:
+        ConfigError: It is neither, and nearest of all that can be swept is a disturbance.
+    """
+    word = key.replace("-", "_")
+    name = word.partition("@")[0]
+    if name in DISTURBANCES:
+        return word
+    near = nearest(name, [*DISTURBANCES, *EDIT_NAMES])
+    if near and near[0] in DISTURBANCES:
+        raise ConfigError(f"nothing to sweep is called {key!r}: did you mean {near[0]!r}?")
+    return ""
 
 
 def _disturbed(others: Disturbances, key: str, value: float) -> Disturbances:
