@@ -16,7 +16,7 @@ from mjcartpole.envs.disturber import Disturber
 from mjcartpole.envs.editable import Editable
 from mjcartpole.envs.names import CartPoleNames, refuse_slip
 from mjcartpole.envs.observations import Observation, observed, observer
-from mjcartpole.envs.options import reset_options, rules_of, usual
+from mjcartpole.envs.options import added_of, reset_options, rules_of, usual
 from mjcartpole.envs.pictures import InNotebooks, Pictures, RenderMode, warn_without_mode
 from mjcartpole.envs.spec import PortableSpec
 from mjcartpole.errors import ConfigError
@@ -25,7 +25,6 @@ from mjcartpole.media.renderer import DEFAULT_HEIGHT, DEFAULT_WIDTH
 from mjcartpole.media.scene import DEFAULT_CAMERA
 from mjcartpole.physics.bodies import starting_state
 from mjcartpole.physics.cartpole import CartPole
-from mjcartpole.physics.edit.edits import edits_of
 from mjcartpole.physics.load import Edits, ModelLike, load_shared
 from mjcartpole.physics.simulation import FARTHEST_SANE, Simulation, State, as_seen, check_sane
 from mjcartpole.rewards import CONSTANT
@@ -186,8 +185,7 @@ class CartPoleEnv(
         self._model = Editable(cartpole, integrator)
         # Made when it is first needed: it takes several times as long as all the rest.
         self._simulation: Simulation | None = None
-        added = Disturbances.taken_from(more, disturbances)
-        added.check_apart(edits_of(edits or ()))
+        added = added_of(more, disturbances, edits)
         self._task = rules_of(task, cast(Changes, more), sutton_barto_reward=sutton_barto_reward)
         self.disturber = Disturber.where_needed(added, cartpole, self._task)
         self._observation = observation

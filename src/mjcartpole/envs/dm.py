@@ -18,10 +18,10 @@ from mjcartpole.envs.disturber import Disturber
 from mjcartpole.envs.disturbers import in_step
 from mjcartpole.envs.dm_physics import HIGHLIGHT, Physics, StartingStates, control, specs
 from mjcartpole.envs.observations import Observation, with_cosines
+from mjcartpole.envs.options import added_of
 from mjcartpole.errors import ConfigError, check_known
 from mjcartpole.physics.bodies import starting_state
 from mjcartpole.physics.cartpole import CartPole
-from mjcartpole.physics.edit.edits import edits_of
 from mjcartpole.physics.load import Edits, ModelLike, load_model
 from mjcartpole.physics.variants import variant
 from mjcartpole.rules import MOST_STEPS, Changes
@@ -308,8 +308,7 @@ def load(
     """
     known = {BALANCE: CARTPOLE_V1, **TASKS}
     check_known("task", task_name, known)
-    added = Disturbances.taken_from(more, disturbances)
-    added.check_apart(edits_of(edits or ()))
+    added = added_of(more, disturbances, edits)
     task = known[task_name].with_changes(**cast(Changes, more))
     if time_limit is None:
         time_limit = task.time_limit * CONTROL_STEP

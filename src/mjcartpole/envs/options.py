@@ -6,7 +6,10 @@ from typing import Any, NamedTuple, SupportsFloat
 
 from gymnasium.envs.classic_control.utils import maybe_parse_reset_bounds
 
+from mjcartpole.disturbances.disturbances import Disturbances
 from mjcartpole.errors import ConfigError
+from mjcartpole.physics.edit.edits import edits_of
+from mjcartpole.physics.load import Edits
 from mjcartpole.rewards import minus_one_at_the_end
 from mjcartpole.rules import Changes
 from mjcartpole.task import CARTPOLE_V1, Task, resolve
@@ -51,6 +54,27 @@ def rules_of(task: Task | str, changes: Changes, *, sutton_barto_reward: bool) -
             "sutton_barto_reward=True is reward='minus-one-at-the-end'; leave out one of the two"
         )
     return rules.with_changes(reward=minus_one_at_the_end)
+
+
+def added_of(
+    more: dict[str, Any],
+    disturbances: Disturbances | Mapping[str, Any] | None,
+    edits: Edits,
+) -> Disturbances:
+    """Return an environment's disturbances; those among keyword arguments are taken out of there.
+
+    Args:
+        more: Rules and disturbances, by name.
+        disturbances: All of them in one.
+        edits: Of the model, which does not vary by the same numbers.
+
+    Raises:
+        ConfigError: They make no sense, one is given twice, or an edit would have no effect.
+        TypeError: A keyword argument is none.
+    """
+    added = Disturbances.taken_from(more, disturbances)
+    added.check_apart(edits_of(edits or ()))
+    return added
 
 
 def usual(task: Task) -> ResetOptions:

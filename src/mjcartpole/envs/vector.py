@@ -15,7 +15,7 @@ from mjcartpole.envs.actions import action_space, controls_of_choices, controls_
 from mjcartpole.envs.disturbers import Disturbers
 from mjcartpole.envs.names import FixedNames
 from mjcartpole.envs.observations import Observation, observation_space, observed
-from mjcartpole.envs.options import rules_of, start_bounds
+from mjcartpole.envs.options import added_of, rules_of, start_bounds
 from mjcartpole.envs.vector_pictures import VectorPictures, VectorRenderMode, check_render_mode
 from mjcartpole.errors import ConfigError, ResetNeededError
 from mjcartpole.integrator import Integrator
@@ -23,7 +23,6 @@ from mjcartpole.media.renderer import DEFAULT_HEIGHT, DEFAULT_WIDTH, open_render
 from mjcartpole.media.scene import DEFAULT_CAMERA, check_picture
 from mjcartpole.physics.batch_simulation import BatchSimulation
 from mjcartpole.physics.bodies import starting_state
-from mjcartpole.physics.edit.edits import edits_of
 from mjcartpole.physics.load import Edits, ModelLike, load_model
 from mjcartpole.rewards import CONSTANT
 from mjcartpole.rules import Changes
@@ -156,8 +155,7 @@ class CartPoleVectorEnv(
             RenderError: The size of a picture makes no sense, or the model has no such camera.
         """
         self.num_envs = _count("num_envs", num_envs)
-        added = Disturbances.taken_from(more, disturbances)
-        added.check_apart(edits_of(edits or ()))
+        added = added_of(more, disturbances, edits)
         self._task = rules_of(task, cast(Changes, more), sutton_barto_reward=sutton_barto_reward)
         self._observation = observation
         steps = self._task.time_limit if max_episode_steps is None else max_episode_steps
