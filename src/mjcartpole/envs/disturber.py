@@ -11,15 +11,15 @@ from gymnasium import spaces
 
 from mjcartpole.disturbances.contexts import Chance, Context, Contexts
 from mjcartpole.disturbances.disturbances import Disturbances
-from mjcartpole.disturbances.effects import QUEUE, Effects, actuate, forget, sense
+from mjcartpole.disturbances.effects import QUEUE, actuate, forget, sense
 from mjcartpole.envs.observations import Observation, Observed, with_cosines
 from mjcartpole.errors import ResetNeededError
 from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.edit.edits import edits_of
 from mjcartpole.physics.load import Edits
 from mjcartpole.physics.simulation import Simulation, State
-from mjcartpole.physics.variants import contexts_of
-from mjcartpole.task import CONTROL_STEP, Task, control_of
+from mjcartpole.physics.variants import contexts_of, effects_on
+from mjcartpole.task import Task, control_of
 
 
 class Disturber:
@@ -67,9 +67,7 @@ class Disturber:
 
     def fit(self, cartpole: CartPole | None) -> None:
         """Let all times be those of a model, before an episode."""
-        poles, step = (cartpole.poles, cartpole.control_step) if cartpole else (1, CONTROL_STEP)
-        made: tuple[Effects, list[float]] = self.disturbances.effects(poles, step, self._task)
-        self.effects, self.memory = made
+        self.effects, self.memory = effects_on(cartpole, self.disturbances, self._task)
 
     def follow(
         self, np_random: np.random.Generator, chance: Chance | None = None, episode: int = 0

@@ -14,8 +14,8 @@ from mjcartpole.physics.bodies import starting_state
 from mjcartpole.physics.cartpole import CartPole, own_copy
 from mjcartpole.physics.cartpole_v1 import FORCE
 from mjcartpole.physics.simulation import Simulation
-from mjcartpole.physics.variants import contexts_of, variant
-from mjcartpole.task import CONTROL_STEP, Task, state_names
+from mjcartpole.physics.variants import contexts_of, effects_on, variant
+from mjcartpole.task import Task, state_names
 
 
 class Worlds:
@@ -100,10 +100,7 @@ class Worlds:
         inner = _physics(simulation, arrays, task, self._fitted)
         if not disturbances.are_some:
             return _World(inner, simulation, arrays)
-        control_step = cartpole.control_step if cartpole else CONTROL_STEP
-        effects, memory = disturbances.effects(
-            cartpole.poles if cartpole else 1, control_step, task
-        )
+        effects, memory = effects_on(cartpole, disturbances, task)
         arrays = arrays._replace(memory=np.array(memory))
         physics = Disturbed(
             inner=inner,

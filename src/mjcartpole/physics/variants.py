@@ -7,9 +7,11 @@ import numpy as np
 
 from mjcartpole.disturbances.contexts import Context, Contexts
 from mjcartpole.disturbances.disturbances import Disturbances
+from mjcartpole.disturbances.effects import Effects
 from mjcartpole.errors import ConfigError, ModelError
 from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.load import load_shared
+from mjcartpole.task import CONTROL_STEP, Task
 
 MOST: Final = 1_000
 """How many are kept."""
@@ -50,6 +52,24 @@ def contexts_of(base: CartPole, disturbances: Disturbances) -> Contexts:
             except (ConfigError, ModelError) as error:
                 raise ConfigError(f"vary {each.text!r} cannot be: {error}") from error
     return Contexts(ranges, disturbances.pool or 0, disturbances.widen)
+
+
+def effects_on(
+    cartpole: CartPole | None, disturbances: Disturbances, task: Task
+) -> tuple[Effects, list[float]]:
+    """Return what disturbances do to a model, and the memory of an episode.
+
+    Args:
+        cartpole: The model; None on gymnasium's equations.
+        disturbances: What is added.
+        task: The rules.
+
+    Raises:
+        ConfigError: They make no sense here.
+    """
+    if cartpole is None:
+        return disturbances.effects(1, CONTROL_STEP, task)
+    return disturbances.effects(cartpole.poles, cartpole.control_step, task)
 
 
 def write_numbers(source: mujoco.MjModel, target: mujoco.MjModel) -> None:

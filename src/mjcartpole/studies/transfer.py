@@ -18,9 +18,9 @@ from mjcartpole.learning.naming import added_flags
 from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.edit.edits import edits_of
 from mjcartpole.physics.load import Edits, ModelLike, load_model
-from mjcartpole.physics.variants import contexts_of
+from mjcartpole.physics.variants import contexts_of, effects_on
 from mjcartpole.studies.statistics import Interval, bootstrap_interval
-from mjcartpole.task import CARTPOLE_V1, CONTROL_STEP, Task, resolve
+from mjcartpole.task import CARTPOLE_V1, Task, resolve
 
 GYM: Final = "gym"
 """The place that is gymnasium's own CartPole-v1, instead of a model."""
@@ -58,8 +58,7 @@ class Place:
         Raises:
             ConfigError: See above.
         """
-        step = self.cartpole.control_step if self.cartpole else CONTROL_STEP
-        self.disturbances.effects(self.poles, step, task)
+        effects_on(self.cartpole, self.disturbances, task)
         if self.cartpole and self.disturbances.vary:
             contexts_of(self.cartpole, self.disturbances)
 
