@@ -7,6 +7,7 @@ from mjcartpole.commands.printing import counted
 from mjcartpole.files import write_whole
 from mjcartpole.learning.folders import locked_folder
 from mjcartpole.media import plots
+from mjcartpole.page.report import report_html
 from mjcartpole.studies.study.folder import REPORTS
 from mjcartpole.studies.study.report import sections
 from mjcartpole.studies.study.report_plot import ReportPlot
@@ -24,16 +25,20 @@ def report(folder: Path, baseline: Sequence[str]) -> int:
     """
     results = read_results(folder)
     against = results.baseline(baseline)
-    found, drawn = sections(results, against), plots.is_installed()
-    in_markdown, in_latex, plot = (folder / name for name in REPORTS)
+    found = sections(results, against)
+    in_markdown, in_latex, page, plot = (folder / name for name in REPORTS)
     name, runs = folder.resolve().name, counted(len(results.seeds), "run")
     failed = f"; {results.failed:,} more failed, and are left out" if results.failed else ""
     head = f"{runs}{failed}. Intervals are 95 % bootstrap intervals; IQM is the interquartile mean."
+    figure = ReportPlot(results).figure() if plots.is_installed() else None
     with locked_folder(folder):
-        write_whole(in_markdown, markdown(name, head, found, plot.name if drawn else ""))
+        write_whole(in_markdown, markdown(name, head, found, plot.name if figure else ""))
         write_whole(in_latex, latex(name, found))
-        if drawn:
-            plots.write_plot(ReportPlot(results).figure(), plot)
+        write_whole(page, report_html(name, head, found, plots.svg_of(figure) if figure else ""))
+        if figure:
+            plots.write_plot(figure, plot)
     print(*(section.sentence for section in found), sep="\n")
-    print(f"\nreport {in_markdown}\nlatex  {in_latex}" + (f"\nplot   {plot}" if drawn else ""))
+    print(f"\nreport {in_markdown}\npage   {page}\nlatex  {in_latex}")
+    if figure:
+        print(f"plot   {plot}")
     return 0

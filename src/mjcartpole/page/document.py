@@ -67,7 +67,7 @@ def page_html(runs: Sequence[Mapping[str, Any]], assets: Path = ASSETS) -> str:
     }
     names = ", ".join(str(run["name"]) for run in runs)
     return _SHELL.format(
-        policy=_POLICY.format(script=_digest(script), style=_digest(style)),
+        policy=_POLICY.format(script=digest(script), style=digest(style)),
         title=html.escape(f"{names} · mjcartpole"),
         style=style.decode(),
         data=json.dumps(page).replace("<", "\\u003c"),
@@ -94,5 +94,6 @@ def _asset(assets: Path, name: str) -> bytes:
     return read_bytes(assets / name, _MOST_BYTES)
 
 
-def _digest(content: bytes) -> str:
+def digest(content: bytes) -> str:
+    """Return what a page's policy calls a script or a style that may be."""
     return f"sha256-{in_base64(hashlib.sha256(content).digest())}"

@@ -228,6 +228,8 @@ def test_the_command_writes_it_and_says_it(folder, capsys):
     assert out.startswith("Best by greedy_mean is alpha=0.3 ties=random: ")
     assert "P(better than 0.3)" in (folder / "report.md").read_text()
     assert (folder / "report.tex").is_file()
+    page = (folder / "report.html").read_text()
+    assert "<th>0.3</th>" in page and ("data:image/svg+xml" in page) == is_installed()
     assert (folder / "report.png").is_file() == is_installed()
 
 

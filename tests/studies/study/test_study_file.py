@@ -2,12 +2,15 @@
 
 import textwrap
 import tomllib
+from pathlib import Path
 
 import pytest
 
 from mjcartpole.errors import ConfigError, FileError
-from mjcartpole.studies.study.design import Factor, Range
+from mjcartpole.studies.study.design import Factor, Range, points_of
 from mjcartpole.studies.study.study_file import MOST_BYTES, read_study, study_of
+
+DOCS = Path(__file__).resolve().parents[3] / "docs"
 
 
 def meant(text):
@@ -125,3 +128,9 @@ def test_a_file_that_is_too_large_is_not_read(tmp_path):
     (tmp_path / "a.toml").write_bytes(b"#" * (MOST_BYTES + 1))
     with pytest.raises(FileError, match="no more than 1,048,576 are read"):
         read_study(tmp_path / "a.toml")
+
+
+@pytest.mark.parametrize("path", sorted(DOCS.rglob("*.toml")), ids=lambda path: path.stem)
+def test_the_studies_of_the_docs_are_studies(path):
+    study = read_study(path)
+    assert len(points_of(study.factors, study.design, study.samples, study.design_seed)) > 5

@@ -5,7 +5,7 @@ study.toml      what was asked, as its file was when the study last went on
 results.jsonl   what runs have come to, as they came
 runs.csv        a row for each run, in the plan's order; runs.parquet too, where that can be written
 curves.csv      their learning curves
-report.md       what they say together, see report.py; report.tex and report.png too
+report.md       what they say together, see report.py; report.html, report.tex and report.png too
 """
 
 import contextlib
@@ -20,7 +20,7 @@ from mjcartpole.studies.study.records import LOG
 from mjcartpole.studies.study.tables import CURVES, PARQUET, RUNS
 
 STUDY: Final = "study.toml"
-REPORTS: Final = ("report.md", "report.tex", "report.png")
+REPORTS: Final = ("report.md", "report.tex", "report.html", "report.png")
 FILES: Final = (LOG, RUNS, CURVES, PARQUET, *REPORTS, STUDY)
 """In the order of removal."""
 
