@@ -51,7 +51,10 @@ def table(folder):
 
 def lasting(folder):
     """What is the same wherever it was done."""
-    rows = [{k: v for k, v in row.items() if k not in ("seconds", "host")} for row in table(folder)]
+    rows = [
+        {k: v for k, v in row.items() if k not in ("seconds", "steps_per_second", "host")}
+        for row in table(folder)
+    ]
     return rows, (folder / "curves.csv").read_text()
 
 

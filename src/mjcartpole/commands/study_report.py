@@ -9,10 +9,12 @@ from mjcartpole.learning.folders import locked_folder
 from mjcartpole.media import plots
 from mjcartpole.page.report import report_html
 from mjcartpole.studies.study.folder import REPORTS
+from mjcartpole.studies.study.plan import in_words
 from mjcartpole.studies.study.report import sections
 from mjcartpole.studies.study.report_plot import ReportPlot
 from mjcartpole.studies.study.report_text import latex, markdown
-from mjcartpole.studies.study.results import read_results
+from mjcartpole.studies.study.results import Results, read_results
+from mjcartpole.studies.study.settings import PRESET, USUAL_PRESET
 
 
 def report(folder: Path, baseline: Sequence[str]) -> int:
@@ -27,9 +29,7 @@ def report(folder: Path, baseline: Sequence[str]) -> int:
     against = results.baseline(baseline)
     found = sections(results, against)
     in_markdown, in_latex, page, plot = (folder / name for name in REPORTS)
-    name, runs = folder.resolve().name, counted(len(results.seeds), "run")
-    failed = f"; {results.failed:,} more failed, and are left out" if results.failed else ""
-    head = f"{runs}{failed}. Intervals are 95 % bootstrap intervals; IQM is the interquartile mean."
+    name, head = folder.resolve().name, _head(results)
     figure = ReportPlot(results).figure() if plots.is_installed() else None
     with locked_folder(folder):
         write_whole(in_markdown, markdown(name, head, found, plot.name if figure else ""))
@@ -42,3 +42,14 @@ def report(folder: Path, baseline: Sequence[str]) -> int:
     if figure:
         print(f"plot   {plot}")
     return 0
+
+
+def _head(results: Results) -> str:
+    usual = {PRESET: USUAL_PRESET, **results.study.base}
+    differs = [factor.name for factor in results.study.factors]
+    base = in_words({name: value for name, value in usual.items() if name not in differs})
+    failed = f"; {results.failed:,} more failed, and are left out" if results.failed else ""
+    return (
+        f"{counted(len(results.seeds), 'run')}{f' of {base}' if base else ''}{failed}. Intervals "
+        "are 95 % bootstrap intervals; IQM is the interquartile mean."
+    )

@@ -52,7 +52,7 @@ def first_run(**base):
 
 
 def lasting(record):
-    return dataclasses.replace(record, seconds=0.0)
+    return dataclasses.replace(record, times={})
 
 
 @pytest.mark.parametrize("base", [{"backend": "gym"}, {"gravity": 3.7}, {"own_timestep": True}])

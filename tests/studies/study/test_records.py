@@ -31,9 +31,12 @@ def test_a_record_says_what_the_training_says(record):
         "robust_mean": None,
         "robust_minimum": None,
         "area_under_curve": pytest.approx(alone.returns.mean()),
+        "table_bytes": 1 * 3 * 6 * 8 * 2 * 8,
     }
     assert (record.episodes_trained, record.steps_trained) == (120, alone.steps)
-    assert set(record.versions) == set(PACKAGES) and record.seconds > 0 and record.host
+    assert set(record.versions) == set(PACKAGES) and record.host
+    seconds = record.times["seconds"]
+    assert record.times["steps_per_second"] == pytest.approx(alone.steps / seconds, rel=0.01)
     assert [point[0] for point in record.greedy] == [40, 80, 120]
     assert record.curve[-1][0] == 120 and len(record.curve) == 50
     ends = [0, *(int(end) for end, _ in record.curve)]

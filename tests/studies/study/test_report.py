@@ -116,6 +116,7 @@ def test_the_base_line_is_the_one_that_is_named(results):
 def test_a_run_that_was_never_solved_counts_as_all_that_it_spent(results):
     low, high = table(results, "episodes_to_solve", "alpha")
     assert (low["worst"], high["worst"]) == ("100", "13")
+    assert (low["solved"], high["solved"]) == ("75%", "100%")
     assert low["IQM"] == f"{iqm([10, 11, 12, 100] * 2):.5g}"
     # 16 pairs a task: of seeds 0 to 2 nobody is ahead but for 3 against them, 100 loses to all.
     wins = sum(
@@ -169,6 +170,58 @@ def test_a_range_is_told_in_parts(tmp_path):
     alpha = read_results(write(tmp_path / "mine", some, text)).levels[0]
     assert alpha.names[0] == "0 to 0.244" and len(alpha.names) == 4
     assert np.bincount(alpha.labels).tolist() == [10] * 4
+
+
+def three_factors():
+    """What only three together explain, and seeds: +1 or -1 by parity, and a tenth for a seed."""
+    levels = {"alpha": ("0.1", "0.3"), "ties": ("first", "random"), "gamma": ("0.9", "1.0")}
+    found = []
+    for point, places in enumerate(itertools.product((0, 1), repeat=3), start=1):
+        about = {name: levels[name][place] for name, place in zip(levels, places, strict=True)}
+        for seed in (0, 1):
+            mean = (-1) ** sum(places) + (0.1 if seed else -0.1)
+            found.append({**rows()[0], **about, "point": point, "seed": seed, "greedy_mean": mean})
+    return found
+
+
+def test_what_only_three_factors_explain_is_not_left_to_seeds(tmp_path):
+    text = FILE + "gamma = [0.9, 1.0]\n"
+    shares = {
+        row["factor"]: (row["share of variance"], row["by chance"])
+        for row in table(
+            read_results(write(tmp_path / "mine", three_factors(), text)),
+            "greedy_mean",
+            "sensitivity",
+        )
+    }
+    # By hand: variances 1 and 0.1 squared; one degree of freedom of 15.
+    assert shares["more than two together"] == (f"{1 / 1.01:.1%}", f"{1 / 15:.1%}")
+    assert shares["seeds and the rest"] == (f"{0.01 / 1.01:.1%}", "")
+    assert shares["alpha and gamma"][0] == "0.0%"
+    some = read_results(write(tmp_path / "mine", three_factors()[:-2], text))
+    names = [row["factor"] for row in table(some, "greedy_mean", "sensitivity")]
+    assert "more than two together" not in names
+
+
+def test_a_cell_of_a_pair_keeps_the_points_of_other_factors_apart(tmp_path):
+    text = FILE + "gamma = [0.9, 1.0]\n"
+    results = read_results(write(tmp_path / "mine", three_factors(), text))
+    cell = table(results, "greedy_mean", "alpha and ties: IQM")[0]["first"]
+    ends = bootstrap_interval(np.array([[0.9, -1.1], [1.1, -0.9]]), resamples=2000)
+    assert cell == f"{iqm([-1.1, -0.9, 0.9, 1.1]):.4g} ({ends.low:.4g} to {ends.high:.4g})"
+
+
+def test_points_and_runs_that_are_alike_are_counted(tmp_path):
+    alike = [{**row, "greedy_mean": 500.0, "episodes_to_solve": ""} for row in rows()]
+    results = read_results(write(tmp_path / "mine", alike))
+    means, solved = sections(results, results.baseline(()))
+    assert means.sentence == (
+        "Best by greedy_mean is alpha=0.1 ties=first (and 3 of 4 points that are as good): IQM 500 "
+        "(95 % 500 to 500, 4 runs); no factor explains more of the variance than chance would."
+    )
+    worst = next(each for each in solved.tables if each.title == "worst runs")
+    assert worst.note == "11 more are as bad as the last of these."
+    assert "16 of 16 runs never came to it" in solved.tables[1].note
 
 
 @pytest.mark.parametrize(
@@ -229,6 +282,7 @@ def test_the_command_writes_it_and_says_it(folder, capsys):
     assert "P(better than 0.3)" in (folder / "report.md").read_text()
     assert (folder / "report.tex").is_file()
     page = (folder / "report.html").read_text()
+    assert "16 runs of preset=tuned. Intervals" in page
     assert "<th>0.3</th>" in page and ("data:image/svg+xml" in page) == is_installed()
     assert (folder / "report.png").is_file() == is_installed()
 

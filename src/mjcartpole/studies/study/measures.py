@@ -81,16 +81,25 @@ MEASURES: Final[dict[str, Measure]] = {
         "mean return of all training episodes: the area under the learning curve, by episode",
         lambda its: float(its.result.returns.mean()),
     ),
+    "table_bytes": Measure(
+        "what the table takes in memory",
+        lambda its: its.result.policy.q_table.nbytes,
+        more_is_better=False,
+    ),
     "seconds": Measure(
         "time of the training; other each time, so it stands apart",
-        lambda its: round(its.result.seconds, 3),
+        lambda its: round(its.result.seconds, 6),
         more_is_better=False,
+    ),
+    "steps_per_second": Measure(
+        "steps of the training over that time",
+        lambda its: round(its.result.steps / max(its.result.seconds, 1e-9)),
     ),
 }
 """By name."""
 
-APART: Final = "seconds"
-"""The one that is never the same twice."""
+APART: Final = ("seconds", "steps_per_second")
+"""Those that are never the same twice."""
 
 
 def plays_after(measures: Sequence[str]) -> bool:
@@ -111,9 +120,9 @@ def is_disturbed(measures: Sequence[str]) -> bool:
     return any(name.startswith("robust") for name in measures)
 
 
-def figures_of(outcome: Outcome) -> dict[str, float | None]:
-    """Return all figures of a training that are the same each time."""
-    return {name: each.of(outcome) for name, each in MEASURES.items() if name != APART}
+def figures_of(outcome: Outcome, *, apart: bool = False) -> dict[str, float | None]:
+    """Return all figures of a training that are the same each time; or those that are not."""
+    return {name: each.of(outcome) for name, each in MEASURES.items() if (name in APART) == apart}
 
 
 def curve_of(result: TrainResult) -> list[list[float]]:

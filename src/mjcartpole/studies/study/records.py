@@ -35,13 +35,13 @@ PACKAGES: Final = ("mjcartpole", "mujoco", "numpy", "numba", "gymnasium")
 _FIELDS: Final[Fields] = {
     "key": str,
     "error": str,
-    "figures": {name: float | None for name in MEASURES if name != APART},
+    "figures": {name: float | None for name in MEASURES if name not in APART},
     "episodes_trained": int,
     "steps_trained": int,
     "versions": dict.fromkeys(PACKAGES, str),
     "curve": tuple[tuple[float, ...], ...],
     "greedy": tuple[tuple[float, ...], ...],
-    "seconds": float,
+    "times": dict.fromkeys(APART, float | None),
     "host": str,
 }
 
@@ -59,7 +59,7 @@ class Record:
         versions: By package.
         curve: The learning curve, see `curve_of`.
         greedy: Evaluations in its midst: episodes and steps before, mean, minimum.
-        seconds: Time of the training.
+        times: Figures that are others each time.
         host: Where.
     """
 
@@ -71,7 +71,7 @@ class Record:
     versions: Mapping[str, str]
     curve: Sequence[Sequence[float]]
     greedy: Sequence[Sequence[float]]
-    seconds: float
+    times: Mapping[str, float | None]
     host: str
 
     @classmethod
@@ -124,10 +124,11 @@ def do_run(
         disturbed = _disturbed(result, job, tested, cartpole) if tested else None
     except MjCartPoleError as error:
         return _failed(key, str(error))
+    outcome = Outcome(result, found.evaluation, disturbed)
     return Record(
         key=key,
         error="",
-        figures=figures_of(Outcome(result, found.evaluation, disturbed)),
+        figures=figures_of(outcome),
         episodes_trained=len(result.returns),
         steps_trained=result.steps,
         versions=versions(),
@@ -135,7 +136,7 @@ def do_run(
         greedy=[
             [each.episodes, each.steps, each.mean, each.minimum] for each in result.evaluations
         ],
-        seconds=round(result.seconds, 3),
+        times=figures_of(outcome, apart=True),
         host=socket.gethostname(),
     )
 
@@ -156,8 +157,8 @@ def _disturbed(
 
 
 def _failed(key: str, error: str) -> Record:
-    figures = dict.fromkeys(_FIELDS["figures"])
-    return Record(key, error, figures, 0, 0, versions(), (), (), 0.0, socket.gethostname())
+    figures, times = dict.fromkeys(_FIELDS["figures"]), dict.fromkeys(APART)
+    return Record(key, error, figures, 0, 0, versions(), (), (), times, socket.gethostname())
 
 
 class RecordLog:

@@ -83,15 +83,15 @@ def sections(results: Results, baseline: dict[str, str]) -> list[Section]:
 
 def _section(results: Results, measure: str, baseline: dict[str, str]) -> Section:
     of = OfMeasure(results, measure)
-    best, shares = of.points(), of.shares()
-    tables = [_best(of, best)]
+    points, shares = of.points(), of.shares()
+    tables = [_best(of, points)]
     for levels in results.levels:
         tables += [_factor(of, levels, baseline[levels.name]), _profile(of, levels)]
     for one, other in itertools.combinations(results.levels, 2):
         if len(one.names) * len(other.names) <= MOST_CELLS:
             tables.append(_pair(of, one, other))
     tables += [_sensitivity(of, shares), *_worst(of)]
-    return Section(measure, _sentence(of, best, shares), tuple(tables))
+    return Section(measure, _sentence(of, points, shares), tuple(tables))
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,13 +107,21 @@ class OfMeasure:
         return np.asarray(self.results.scores[self.measure])
 
     @property
+    def solved(self) -> npt.NDArray[np.bool_]:
+        """Whether each run came to it."""
+        return np.asarray(self.results.solved[self.measure])
+
+    @property
     def sign(self) -> int:
         """1 where more is better, else -1."""
         return 1 if MEASURES[self.measure].more_is_better else -1
 
     def of_level(self, levels: Levels, level: int) -> Array:
         """Return the scores of a level: a column for each point on a full grid, else pooled."""
-        chosen = levels.labels == level
+        return self.of_runs(np.flatnonzero(levels.labels == level))
+
+    def of_runs(self, chosen: Labels) -> Array:
+        """Return the scores of some runs, likewise."""
         scores: Array = self.scores[chosen]
         points = self.results.points[chosen]
         numbers, counts = np.unique(points, return_counts=True)
@@ -123,20 +131,17 @@ class OfMeasure:
         by_point: Array = scores[order].reshape(len(numbers), -1).T
         return by_point
 
-    def points(self) -> list[tuple[float, Interval, Array, int]]:
-        """Return IQM, interval, scores and a run of each point, the best first."""
-        found = []
-        for point in np.unique(self.results.points):
-            runs = np.flatnonzero(self.results.points == point)
-            found.append((iqm(self.scores[runs]), runs))
-        # Points of equal averages are told apart by what these leave out.
-        found.sort(
-            key=lambda each: (-self.sign * each[0], -self.sign * self.scores[each[1]].mean())
+    def points(self) -> list[Labels]:
+        """Return the runs of each point, the best first."""
+        numbers = self.results.points
+        return sorted(
+            (np.flatnonzero(numbers == each) for each in np.unique(numbers)), key=self.rank
         )
-        return [
-            (middle, interval_of(self.scores[runs]), self.scores[runs], int(runs[0]))
-            for middle, runs in found[:BEST]
-        ]
+
+    def rank(self, runs: Labels) -> tuple[float, float]:
+        """Return what is less of better runs; equal averages differ in what they leave out."""
+        scores = -self.sign * self.scores[runs]
+        return iqm(scores), float(scores.mean())
 
     def shares(self) -> dict[tuple[str, ...], float]:
         """Return the share of variance of each factor and pair."""
@@ -148,6 +153,17 @@ class OfMeasure:
         """Return which share of variance a factor, or a pair, explains that has no effect."""
         free = [len(each.names) - 1 for each in self.results.levels if each.name in names]
         return math.prod(free) / max(1, self.scores.size - 1)
+
+    def together(self, shares: dict[tuple[str, ...], float]) -> tuple[float, float] | None:
+        """Return which share more than two factors explain, and by chance; None if none can."""
+        numbers, labels = np.unique(self.results.points, return_inverse=True)
+        full = math.prod(len(each.names) for each in self.results.levels) == len(numbers)
+        if len(self.results.levels) < 3 or not full or len(numbers) == self.scores.size:
+            return None
+        all_of_it = variance_shares(self.scores, {"point": labels})["point",]
+        chance = (len(numbers) - 1) / (self.scores.size - 1)
+        fewer = sum(shares.values()), sum(map(self.by_chance, shares))
+        return max(0.0, all_of_it - fewer[0]), chance - fewer[1]
 
 
 def interval_of(scores: Array) -> Interval:
@@ -161,18 +177,22 @@ def _resamples(size: int) -> int:
     return max(_LEAST_RESAMPLES, min(RESAMPLES, _MOST_DRAWN // size))
 
 
-def _best(of: OfMeasure, best: Sequence[tuple[float, Interval, Array, int]]) -> Table:
-    rows = [
-        (
-            of.results.words[run],
-            str(len(scores)),
-            *_average(middle, interval),
-            _worse(of, scores),
-        )
-        for middle, interval, scores, run in best
-    ]
-    note = f"The best {len(rows)} of {len(np.unique(of.results.points))} points."
-    return Table("points", ("point", "runs", "IQM", "95 %", "worst"), tuple(rows), note)
+def _best(of: OfMeasure, points: Sequence[Labels]) -> Table:
+    rows = [(of.results.words[runs[0]], *_of_runs(of, runs)) for runs in points[:BEST]]
+    note = f"The best {len(rows)} of {len(points)} points."
+    return Table("points", ("point", *_columns(of)), tuple(rows), note)
+
+
+def _columns(of: OfMeasure) -> tuple[str, ...]:
+    return ("runs", "IQM", "95 %", "worst", *([] if of.solved.all() else ["solved"]))
+
+
+def _of_runs(of: OfMeasure, chosen: Labels) -> tuple[str, ...]:
+    """Return what is told of some runs, for `_columns`."""
+    scores = of.of_runs(chosen)
+    worst = _number(of.sign * float((of.sign * scores).min()))
+    solved = () if of.solved.all() else (f"{of.solved[chosen].mean():.0%}",)
+    return (str(scores.size), *_average(iqm(scores), interval_of(scores)), worst, *solved)
 
 
 def _factor(of: OfMeasure, levels: Levels, base: str) -> Table:
@@ -182,9 +202,8 @@ def _factor(of: OfMeasure, levels: Levels, base: str) -> Table:
     for place, name in enumerate(levels.names):
         scores = of.of_level(levels, place)
         better = ("", "") if name == base else _improvement(of.sign * scores, of.sign * against)
-        average = _average(iqm(scores), interval_of(scores))
-        rows.append((name, str(scores.size), *average, _worse(of, scores), *better))
-    columns = (levels.name, "runs", "IQM", "95 %", "worst", f"P(better than {base})", "95 % of P")
+        rows.append((name, *_of_runs(of, np.flatnonzero(levels.labels == place)), *better))
+    columns = (levels.name, *_columns(of), f"P(better than {base})", "95 % of P")
     return Table(levels.name, columns, tuple(rows), _unsolved(of))
 
 
@@ -206,7 +225,7 @@ def _profile(of: OfMeasure, levels: Levels) -> Table:
         shares = shares_above(scores, of.sign * at)
         rows.append((name, *(f"{share:.0%}" for share in shares)))
     beyond = "more" if of.sign > 0 else "less"
-    columns = (levels.name, *(f"{beyond} than {value:.4g}" for value in at))
+    columns = (levels.name, *(f"{beyond} than {_number(value, 4)}" for value in at))
     return Table(f"{levels.name}: performance profile", columns, tuple(rows))
 
 
@@ -215,20 +234,27 @@ def _pair(of: OfMeasure, one: Levels, other: Levels) -> Table:
     for place, name in enumerate(one.names):
         cells = []
         for column in range(len(other.names)):
-            scores = of.scores[(one.labels == place) & (other.labels == column)]
-            low, high = interval_of(scores) if scores.size else (0.0, 0.0)
-            cells.append(f"{iqm(scores):.4g} ({low:.4g} to {high:.4g})" if scores.size else "")
+            chosen = np.flatnonzero((one.labels == place) & (other.labels == column))
+            cells.append(_cell(of.of_runs(chosen)) if chosen.size else "")
         rows.append((name, *cells))
     columns = (f"{one.name} \\ {other.name}", *other.names)
     return Table(f"{one.name} and {other.name}: IQM", columns, tuple(rows))
 
 
+def _cell(scores: Array) -> str:
+    middle, interval = _average(iqm(scores), interval_of(scores), digits=4)
+    return f"{middle} ({interval})"
+
+
 def _sensitivity(of: OfMeasure, shares: dict[tuple[str, ...], float]) -> Table:
-    rows = [
+    rows: list[tuple[str, ...]] = [
         (" and ".join(names), f"{share:.1%}", f"{of.by_chance(names):.1%}")
         for names, share in sorted(shares.items(), key=lambda item: -item[1])
     ]
     rest = 1 - sum(shares.values()) if of.scores.std() > 0 else 0.0
+    if together := of.together(shares):
+        rest -= together[0]
+        rows.append(("more than two together", *(f"{share:.1%}" for share in together)))
     rows.append(("seeds and the rest", f"{max(0.0, rest):.1%}", ""))
     note = (
         "A pair's share is what both explain together beyond each; by chance: of no effect at all."
@@ -240,29 +266,38 @@ def _worst(of: OfMeasure) -> list[Table]:
     """Return the worst runs, and the worst seeds over all points."""
     order = np.argsort(of.sign * of.scores, kind="stable")[:WORST]
     seeds = np.array(of.results.seeds, dtype=object)
-    rows = [(str(seeds[run]), of.results.words[run], f"{of.scores[run]:.5g}") for run in order]
+    rows = [(str(seeds[run]), of.results.words[run], _number(of.scores[run])) for run in order]
+    alike = np.count_nonzero(of.scores == of.scores[order[-1]])
+    among = np.count_nonzero(of.scores[order] == of.scores[order[-1]])
+    note = f"{alike - among} more are as bad as the last of these." if alike > among else ""
     means = {seed: float(of.scores[seeds == seed].mean()) for seed in dict.fromkeys(seeds)}
     ranked = sorted(means, key=lambda seed: of.sign * means[seed])[:WORST]
     return [
-        Table("worst runs", ("seed", "point", of.measure), tuple(rows)),
+        Table("worst runs", ("seed", "point", of.measure), tuple(rows), note),
         Table(
             "worst seeds",
             ("seed", f"mean {of.measure} over all points"),
-            tuple((str(seed), f"{means[seed]:.5g}") for seed in ranked),
+            tuple((str(seed), _number(means[seed])) for seed in ranked),
         ),
     ]
 
 
-def _average(middle: float, interval: Interval) -> tuple[str, str]:
-    return f"{middle:.5g}", f"{interval.low:.5g} to {interval.high:.5g}"
+def _number(value: float, digits: int = 5) -> str:
+    """Return a number as a person reads it.
+
+    >>> _number(269.3333), _number(12000), _number(0.00123456), _number(2.5, digits=1)
+    ('269.33', '12,000', '0.0012346', '2')
+    """
+    return f"{value:,.0f}" if abs(value) >= 10_000 else f"{value:.{digits}g}"
 
 
-def _worse(of: OfMeasure, scores: Array) -> str:
-    return f"{of.sign * (of.sign * scores).min():.5g}"
+def _average(middle: float, interval: Interval, digits: int = 5) -> tuple[str, str]:
+    low, high = (_number(end, digits) for end in interval)
+    return _number(middle, digits), f"{low} to {high}"
 
 
 def _unsolved(of: OfMeasure) -> str:
-    solved = of.results.solved[of.measure]
+    solved = of.solved
     if solved.all():
         return ""
     return (
@@ -273,13 +308,17 @@ def _unsolved(of: OfMeasure) -> str:
 
 def _sentence(
     of: OfMeasure,
-    best: Sequence[tuple[float, Interval, Array, int]],
+    points: Sequence[Labels],
     shares: dict[tuple[str, ...], float],
 ) -> str:
-    middle, interval, scores, run = best[0]
+    best = points[0]
+    scores = of.scores[best]
+    middle, interval = _average(iqm(scores), interval_of(scores))
+    alike = sum(of.rank(runs) == of.rank(best) for runs in points[1:])
     said = (
-        f"Best by {of.measure} is {of.results.words[run]}: IQM {middle:.5g} "
-        f"(95 % {interval.low:.5g} to {interval.high:.5g}, {len(scores)} runs)"
+        f"Best by {of.measure} is {of.results.words[best[0]]}"
+        + (f" (and {alike} of {len(points)} points that are as good)" if alike else "")
+        + f": IQM {middle} (95 % {interval}, {len(scores)} runs)"
     )
     names, share = max(shares.items(), key=lambda item: item[1])
     if share <= of.by_chance(names):

@@ -23,7 +23,7 @@ def markdown(name: str, head: str, sections: Sequence[Section], plot: str = "") 
         sections: A measure each.
         plot: The file of a plot beside it; empty if there is none.
     """
-    parts = [f"# {_plain(name)}", head]
+    parts = [f"# {_plain(name)}", _plain(head)]
     parts += [f"![]({plot})"] if plot else []
     for section in sections:
         parts += [f"## {section.measure}", _plain(section.sentence)]

@@ -13,7 +13,7 @@ from mjcartpole.studies.study.records import Record
 from mjcartpole.studies.study.settings import as_text
 
 RUNS, CURVES, PARQUET = "runs.csv", "curves.csv", "runs.parquet"
-TIMES: Final = ("seconds", "host")
+TIMES: Final = (*APART, "host")
 """Columns that differ from time to time; the last ones."""
 
 Row = dict[str, Any]
@@ -26,7 +26,7 @@ def rows_of(plan: Plan, found: Mapping[str, Record]) -> list[Row]:
 
 
 def _row(plan: Plan, run: PlannedRun, record: Record) -> Row:
-    figures = {name: record.figures[name] for name in plan.study.measure if name != APART}
+    figures = {name: record.figures[name] for name in plan.study.measure if name not in APART}
     return {
         "point": run.point,
         **{name: as_text(value) for name, value in run.factors.items()},
@@ -37,7 +37,7 @@ def _row(plan: Plan, run: PlannedRun, record: Record) -> Row:
         "error": record.error,
         "key": run.key,
         **record.versions,
-        "seconds": record.seconds,
+        **record.times,
         "host": record.host,
     }
 
