@@ -1,6 +1,6 @@
 """CartPole-v1 with MuJoCo underneath, as a `dm_env.Environment` built on dm_control.
 
-Nothing but this file and `dm_physics.py` imports dm_control, which takes a second or two.
+Nothing but this file and `dm_physics.py` imports it, since dm_control takes a second or two.
 """
 
 import collections

@@ -1,35 +1,14 @@
-"""dm_control's physics of a cart-pole, and what draws its starting states.
-
-Nothing but this file and `dm.py` imports dm_control, which takes a second or two.
-"""
+"""dm_control's physics of a cart-pole, and what draws its starting states."""
 
 import copy
-import warnings
 from typing import Any, Final
 
 import numpy as np
 import numpy.typing as npt
 
 from mjcartpole.physics.cartpole import CartPole
+from mjcartpole.physics.dm_control import control, mujoco, specs, wrapper
 from mjcartpole.physics.variants import write_numbers
-
-try:
-    with warnings.catch_warnings():
-        # It looks for a window system on import, and warns where there is none.
-        warnings.simplefilter("ignore")
-        from dm_control import mujoco
-        from dm_control.mujoco import wrapper
-        from dm_control.rl import control
-        from dm_env import specs  # type: ignore[import-untyped]
-
-        # Its list of MuJoCo's fields may be another version's, which shows at the first model.
-        mujoco.Physics.from_xml_string("<mujoco/>")
-except Exception as error:
-    _why = " ".join(f"{type(error).__name__}: {error}".split())
-    raise ImportError(
-        f"mjcartpole.envs.dm needs dm_control, which does not load: {_why}; it comes along "
-        "on Python 3.11 and 3.12, and fits MuJoCo below 4"
-    ) from error
 
 __all__ = ["HIGHLIGHT", "Physics", "StartingStates", "control", "specs"]
 
