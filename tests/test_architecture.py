@@ -18,6 +18,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = Path(mjcartpole.__file__).parent
 LAYERS = [
     "errors",
+    "packages",
     "cores",
     "rewards",
     "rules",

@@ -5,7 +5,7 @@ import os
 import pytest
 
 from command_line import call
-from mjcartpole import cli
+from mjcartpole.commands import parsing
 from mjcartpole.errors import ConfigError
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.physics.load import load_model
@@ -30,7 +30,7 @@ def test_what_has_no_effect_is_refused(arguments, said, capsys):
 
 
 def test_flags_are_the_fields_of_the_config():
-    command = cli.parse(["train", "--gamma", "0.9", "--bins", "1", "1", "2", "3", "--seed=4"])
+    command = parsing.parse(["train", "--gamma", "0.9", "--bins", "1", "1", "2", "3", "--seed=4"])
     assert command.config == TrainConfig(gamma=0.9, bins=(1, 1, 2, 3), seed=4)
     assert command.where.preset == "tuned"
     assert command.how.video is True
@@ -38,14 +38,14 @@ def test_flags_are_the_fields_of_the_config():
 
 @pytest.mark.parametrize("form", [["--preset", "article"], ["--preset=article"]])
 def test_a_preset_changes_the_defaults(form):
-    command = cli.parse(["train", "--backend", "gym", *form, "--episodes", "50"])
+    command = parsing.parse(["train", "--backend", "gym", *form, "--episodes", "50"])
     assert command.config == TrainConfig.preset("article", backend="gym", episodes=50)
     assert command.where.preset == "article"
 
 
 @pytest.mark.parametrize("form", [["--method", "sarsa"], ["--method=sarsa"]])
 def test_a_method_has_flags_of_its_own(form, capsys):
-    command = cli.parse(["train", *form, "--epsilon", "0.5"])
+    command = parsing.parse(["train", *form, "--epsilon", "0.5"])
     assert command.config == TrainConfig(method="sarsa", epsilon=0.5)
     assert "--td-lambda" not in call(["train", *form, "--help"], capsys)[1]
     assert "--td-lambda" in call(["train", "--help"], capsys)[1]
@@ -65,16 +65,16 @@ def test_a_method_has_flags_of_its_own(form, capsys):
     ],
 )
 def test_commas_part_the_values_of_a_list(words, values):
-    assert cli.parse(["train", *words.split()]).config == TrainConfig(**values)
+    assert parsing.parse(["train", *words.split()]).config == TrainConfig(**values)
 
 
 def test_commas_elsewhere(here):
-    assert cli.parse(["parity", "--rungs", "1,2,3", "--quick"]).rungs == (1, 2, 3)
-    command = cli.parse(["transfer", "a,b", "--models", "gym,long", "-o", "c,d"])
+    assert parsing.parse(["parity", "--rungs", "1,2,3", "--quick"]).rungs == (1, 2, 3)
+    command = parsing.parse(["transfer", "a,b", "--models", "gym,long", "-o", "c,d"])
     assert command.models == ("gym", "long")
     assert ([str(source) for source in command.sources], str(command.output)) == (["a,b"], "c,d")
     (here / "heavy,long.xml").write_text("<mujoco/>")
-    command = cli.parse(["transfer", "a", "--models", "heavy,long.xml", "gym"])
+    command = parsing.parse(["transfer", "a", "--models", "heavy,long.xml", "gym"])
     assert command.models == ("heavy,long.xml", "gym")
 
 
@@ -85,13 +85,13 @@ def test_a_list_that_makes_no_sense_is_one_line(here, capsys):
 
 
 def test_negative_numbers_are_values():
-    command = cli.parse(["train", "--low", "-1", "-2.5", "-0.3", "-4e0"])
+    command = parsing.parse(["train", "--low", "-1", "-2.5", "-0.3", "-4e0"])
     assert command.config.low == (-1.0, -2.5, -0.3, -4.0)
 
 
 def test_a_value_that_makes_no_sense_is_our_error():
     with pytest.raises(ConfigError, match="gamma must be a number from 0 to 1, not 2"):
-        cli.parse(["train", "--gamma", "2"])
+        parsing.parse(["train", "--gamma", "2"])
 
 
 BAD = [

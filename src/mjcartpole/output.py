@@ -18,6 +18,9 @@ from typing import TYPE_CHECKING, Any, Final, TextIO
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer
 
+FAILED: Final = 2
+"""The exit code of a command that could not do all that was asked of it."""
+
 _DEGRADES: Final = "mjcartpole.degrades"
 _PLAIN: Final = {
     **{"→": "->", "≤": "<=", "≥": ">=", "…": "...", "°": " deg", "±": "+-", "²": "^2"},

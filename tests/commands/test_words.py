@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 import tyro
 
-from mjcartpole.cli import parse
 from mjcartpole.commands.options import UsageError
+from mjcartpole.commands.parsing import parse
 from mjcartpole.commands.words import LISTS, rewritten, value_of
 
 

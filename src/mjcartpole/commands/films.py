@@ -6,8 +6,6 @@ from collections.abc import Callable, Generator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from PIL import Image
-
 from mjcartpole.commands.options import VIDEOS
 from mjcartpole.commands.printing import counted, with_added
 from mjcartpole.commands.progress import progress_bar
@@ -18,6 +16,7 @@ from mjcartpole.learning.documents import read_summary
 from mjcartpole.learning.naming import shortened
 from mjcartpole.learning.training import TrainResult
 from mjcartpole.media.mp4 import why_no_mp4
+from mjcartpole.media.pillow import Image
 from mjcartpole.media.video import Video, write_video
 from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.signals import Interrupted, StopSignals

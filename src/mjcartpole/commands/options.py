@@ -13,7 +13,6 @@ import tyro
 
 from mjcartpole.errors import MjCartPoleError
 
-FAILED = 2
 RUNS = Path("runs")
 VIDEOS = Path("videos")
 

@@ -41,7 +41,7 @@ class Page(Command):
     def run(self) -> int:
         """Play an episode of each, and write the page; all is checked before anything is played."""
         from mjcartpole.commands.policies import set_up, shown
-        from mjcartpole.media.plots import is_installed
+        from mjcartpole.media.plots import MISSING_LIBRARY, is_installed
         from mjcartpole.page.document import check_built, page_html
         from mjcartpole.page.run_data import check_shown
 
@@ -56,7 +56,7 @@ class Page(Command):
         check_built()
         plots = self.plots and is_installed()
         if self.plots and not plots:
-            print("mjcartpole: no plots: matplotlib is not installed ([plot])", file=sys.stderr)
+            print(f"mjcartpole: no plots: {MISSING_LIBRARY}", file=sys.stderr)
         sources = [shown(source) for source in self.sources]
         setups = [set_up(source, self.target) for source in sources]
         for setup in setups:

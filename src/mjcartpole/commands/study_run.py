@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from mjcartpole.commands import progress
-from mjcartpole.commands.options import FAILED
 from mjcartpole.commands.printing import counted
 from mjcartpole.commands.study_options import StudyOptions
 from mjcartpole.cores import worker_count
+from mjcartpole.output import FAILED
 from mjcartpole.physics.simulation import silence_mujoco
 from mjcartpole.signals import Interrupted, StopSignals
 from mjcartpole.studies.study.cluster import connected, run_there, threads_of

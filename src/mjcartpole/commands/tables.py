@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mjcartpole.commands.options import FAILED
 from mjcartpole.commands.printing import with_added
 from mjcartpole.files import (
     check_free,
@@ -17,6 +16,7 @@ from mjcartpole.files import (
     write_whole,
 )
 from mjcartpole.media import plots
+from mjcartpole.output import FAILED
 from mjcartpole.studies.sweep import SweepResult
 from mjcartpole.studies.transfer import Cell, TransferResult
 

@@ -4,11 +4,11 @@ import sys
 from pathlib import Path
 
 from mjcartpole.commands import progress
-from mjcartpole.commands.options import FAILED
 from mjcartpole.commands.printing import counted, print_seeds
 from mjcartpole.commands.train_options import RunLocation, TrainOptions
 from mjcartpole.commands.train_shared import about, changes, check, draw_curve, go_on, prepare
 from mjcartpole.learning.config import TrainConfig
+from mjcartpole.output import FAILED
 from mjcartpole.signals import Interrupted, StopSignals
 from mjcartpole.studies import multi_seed_runs
 from mjcartpole.studies.multi_seed import SeedRunner

@@ -45,7 +45,7 @@ def check(how: TrainOptions) -> None:
     silence_mujoco()
     check_interval(how.checkpoint_every)
     if how.tensorboard:
-        tensorboard.check_installed()
+        tensorboard.check_writer()
 
 
 def draw_curve(folder: Path, how: TrainOptions) -> None:

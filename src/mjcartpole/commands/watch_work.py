@@ -6,8 +6,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from PIL import Image
-
 from mjcartpole.commands.films import raise_noted, what_happened, write_film
 from mjcartpole.commands.options import VIDEOS
 from mjcartpole.commands.watched_file import POLL, SavedAgainError, Watched
@@ -16,6 +14,7 @@ from mjcartpole.files import atomic_write
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.evaluation import Evaluation
 from mjcartpole.learning.training import Training, TrainResult
+from mjcartpole.media.pillow import Image
 from mjcartpole.media.renderer import open_renderer
 from mjcartpole.output import stdout_problem
 from mjcartpole.physics.cartpole import CartPole

@@ -20,6 +20,7 @@ import numpy.typing as npt
 
 from mjcartpole.errors import ConfigError, check_known
 from mjcartpole.integrator import Integrator
+from mjcartpole.packages import check_installed
 from mjcartpole.task import CARTPOLE_V1, in_words
 
 if TYPE_CHECKING:
@@ -81,8 +82,10 @@ def gains(cartpole: "CartPole", integrator: Integrator = "gym") -> npt.NDArray[n
     """Return the regulator's gains K, shape (2 + 2 poles,): it pushes by -K state.
 
     Raises:
-        ConfigError: Nothing can be regulated: what is pushed does not answer, or not enough.
+        ConfigError: Nothing can be regulated: what is pushed does not answer, or not enough; or
+            SciPy is not installed.
     """
+    check_installed("policy lqr or energy", "scipy")
     from scipy.linalg import solve_discrete_are  # noqa: PLC0415 - slow to import, as is MuJoCo
 
     from mjcartpole.physics.simulation import Simulation  # noqa: PLC0415

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Literal, get_args
 
 from mjcartpole.envs.backend import Backend
 from mjcartpole.errors import check_known
+from mjcartpole.packages import is_installed, missing
 from mjcartpole.task import CARTPOLE_V1, Task
 
 if TYPE_CHECKING:
@@ -64,6 +65,8 @@ def choose_engine(
 
 
 def _why_not_compiled(backend: Backend, cartpole: "CartPole | None", task: Task) -> str:
+    if not is_installed("numba"):
+        return missing("it", "numba")
     try:
         # Numba is heavy, and refuses to be imported beside a NumPy that is newer than it knows.
         _import_numba()

@@ -5,12 +5,14 @@ import os
 import stat
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Final
-
-import filelock
+from typing import TYPE_CHECKING, Final
 
 from mjcartpole.errors import FileError, RunError
 from mjcartpole.files import brief, is_folder, names_in, remove_leftovers
+from mjcartpole.packages import check_installed
+
+if TYPE_CHECKING:
+    import filelock
 
 LOCK: Final = ".lock"
 SEEDS: Final = "seeds.json"
@@ -66,7 +68,10 @@ def locked_folder(folder: Path, *, make: bool = False) -> Iterator[None]:
         lock.release()
 
 
-def _acquired(folder: Path, make: bool, tries: int = 100) -> filelock.BaseFileLock:
+def _acquired(folder: Path, make: bool, tries: int = 100) -> "filelock.BaseFileLock":
+    check_installed("a run's folder", "filelock")
+    import filelock  # noqa: PLC0415 - only what is kept on disk needs it
+
     lock = filelock.FileLock(folder / LOCK)
     try:
         if make:

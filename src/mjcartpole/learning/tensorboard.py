@@ -1,18 +1,17 @@
 """A run's learning curve as TensorBoard events, by tensorboardX: it needs no framework."""
 
 import contextlib
-import importlib.util
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
-from mjcartpole.errors import ConfigError
 from mjcartpole.files import atomic_write
 from mjcartpole.learning.discretizer import Discretizer
 from mjcartpole.learning.learner import Learner
 from mjcartpole.learning.training import TrainResult
+from mjcartpole.packages import check_installed
 
 NAME: Final = "events.out.tfevents.0.mjcartpole"
 POINTS: Final = 10_000
@@ -22,16 +21,13 @@ _ONE_STATE: Final = Discretizer((1,), (-1.0,), (1.0,))
 """No rates depend on what is learned, so there need be no table."""
 
 
-def check_installed() -> None:
+def check_writer() -> None:
     """Refuse where the writer is missing.
 
     Raises:
         ConfigError: See above.
     """
-    if importlib.util.find_spec("tensorboardX") is None:
-        raise ConfigError(
-            "--tensorboard needs the package tensorboardX: pip install 'mjcartpole[tensorboard]'"
-        )
+    check_installed("--tensorboard", "tensorboardX")
 
 
 def write_events(folder: Path, result: TrainResult) -> None:
@@ -40,7 +36,7 @@ def write_events(folder: Path, result: TrainResult) -> None:
     Raises:
         ConfigError: tensorboardX is not installed.
     """
-    check_installed()
+    check_writer()
     # Not its SummaryWriter: that one writes in a thread of its own, and hangs on a full disk.
     from tensorboardX.proto.event_pb2 import Event  # noqa: PLC0415 - an optional package
     from tensorboardX.record_writer import RecordWriter  # noqa: PLC0415

@@ -13,10 +13,10 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
-from PIL import GifImagePlugin, Image
 
 from mjcartpole.errors import RenderError
 from mjcartpole.media.frames import Frame
+from mjcartpole.media.pillow import GifImagePlugin, Image
 
 Box = tuple[int, int, int, int]
 """Left, top, right, bottom in pixels; the last two are outside."""

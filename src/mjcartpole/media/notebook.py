@@ -7,7 +7,6 @@ from collections.abc import Callable
 
 import numpy as np
 import numpy.typing as npt
-from PIL import Image
 
 from mjcartpole.media.plots import Plot, is_installed, png_of
 
@@ -28,6 +27,8 @@ def with_plot(said: str, plot: Callable[[], Plot]) -> str:
 
 def with_frame(said: str, frame: npt.NDArray[np.uint8]) -> str:
     """Return HTML of words and of a rendered frame."""
+    from mjcartpole.media.pillow import Image  # noqa: PLC0415 - words and plots need none
+
     png = io.BytesIO()
     Image.fromarray(frame).save(png, "png")
     return with_picture(said, png.getvalue())

@@ -9,11 +9,11 @@ import math
 from typing import Final
 
 import numpy as np
-from PIL import Image, ImageDraw
 
 from mjcartpole.errors import RenderError
 from mjcartpole.media.hud import Moment, Strip
 from mjcartpole.media.palette import ACTION, Colour
+from mjcartpole.media.pillow import Image, ImageDraw
 from mjcartpole.media.scene import Box, Scene
 from mjcartpole.media.text import Pixels
 

@@ -7,10 +7,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
-from mjcartpole.errors import FileError
+from mjcartpole.errors import FileError, RenderError
 from mjcartpole.files import make_folder
 from mjcartpole.leftovers import name_aside, temporary_beside
 from mjcartpole.media.frames import Frame
+from mjcartpole.packages import check_installed
 
 _NUMBERED: Final = re.compile(r"\d{6,}\.png")
 
@@ -22,7 +23,11 @@ def write_pictures(folder: Path, frames: Iterator[Frame], fps: float) -> int:
         folder: An existing folder.
         frames: Pictures of shape (height, width, 3).
         fps: Frames per second, which pictures do not tell.
+
+    Raises:
+        RenderError: imageio is not installed.
     """
+    check_installed("a folder of pictures", "imageio", RenderError)
     # Imported late: most videos need no single pictures.
     from imageio import v3 as imageio  # noqa: PLC0415
 

@@ -1,7 +1,6 @@
 """Plots: matplotlib without a window or global state, where it is installed."""
 
 import contextlib
-import importlib.util
 import io
 import warnings
 from collections.abc import Iterator, Mapping
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final, Protocol
 
 import numpy as np
 
+from mjcartpole import packages
 from mjcartpole.errors import RenderError
 from mjcartpole.files import atomic_write
 from mjcartpole.media.palette import CURVES, FAINT, GRID, INK, LINE, PAPER, Colour
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 DATES: Final = {".png": {}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
 """What each kind of file would say of the day, so that the same plot has the same bytes."""
 
-MISSING_LIBRARY: Final = "a plot needs the package matplotlib: pip install 'mjcartpole[plot]'"
+MISSING_LIBRARY: Final = packages.missing("a plot", "matplotlib")
 
 
 class Plot(Protocol):
@@ -40,7 +40,7 @@ class Plot(Protocol):
 
 def is_installed() -> bool:
     """Return whether matplotlib is there."""
-    return importlib.util.find_spec("matplotlib") is not None
+    return packages.is_installed("matplotlib")
 
 
 def check_installed() -> None:
@@ -49,8 +49,7 @@ def check_installed() -> None:
     Raises:
         RenderError: See above.
     """
-    if not is_installed():
-        raise RenderError(MISSING_LIBRARY)
+    packages.check_installed("a plot", "matplotlib", RenderError)
 
 
 def css(colour: Colour) -> str:

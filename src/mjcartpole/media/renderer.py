@@ -8,14 +8,12 @@ from typing import Final, Literal, Protocol, Self, get_args
 import mujoco
 import numpy as np
 import numpy.typing as npt
-from PIL import Image
 
 from mjcartpole.errors import RenderError, check_known
 from mjcartpole.media import gl
 from mjcartpole.media.backend_probe import Backend
 from mjcartpole.media.quality import DEFAULT_QUALITY, Quality
 from mjcartpole.media.scene import DEFAULT_CAMERA, Box, Scene
-from mjcartpole.media.sketch import SketchRenderer
 from mjcartpole.media.turns import TakesTurns, drawing
 from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.task import CARTPOLE_V1, Task
@@ -96,16 +94,22 @@ def open_renderer(
 
 def _open(scene: Scene, kind: Kind) -> Renderer:
     if kind == "sketch":
-        return SketchRenderer(scene)
+        return _sketch(scene)
     if kind != "auto":
         return _open_by_name(scene, kind)
     backend = gl.find_backend()
     if backend is None:
-        return SketchRenderer(scene)
+        return _sketch(scene)
     try:
         return GLRenderer(scene, backend)
     except RenderError:
-        return SketchRenderer(scene)
+        return _sketch(scene)
+
+
+def _sketch(scene: Scene) -> Renderer:
+    from mjcartpole.media.sketch import SketchRenderer  # noqa: PLC0415 - OpenGL needs no Pillow
+
+    return SketchRenderer(scene)
 
 
 def _open_by_name(scene: Scene, backend: Backend) -> "GLRenderer":
@@ -210,6 +214,8 @@ class GLRenderer(TakesTurns):
         pixels = flipped[::-1]
         if factor == 1:
             return pixels.copy() if box == self._whole else pixels
+        from mjcartpole.media.pillow import Image  # noqa: PLC0415 - other qualities need none
+
         return np.array(Image.fromarray(pixels).reduce(factor))
 
     def close(self) -> None:

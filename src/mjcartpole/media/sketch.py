@@ -11,10 +11,10 @@ from typing import Final
 import mujoco
 import numpy as np
 import numpy.typing as npt
-from PIL import Image, ImageDraw
 
 from mjcartpole.errors import RenderError
 from mjcartpole.media.outlines import Outline, outline_of, outline_of_wedge
+from mjcartpole.media.pillow import Image, ImageDraw
 from mjcartpole.media.scene import Box, Scene
 from mjcartpole.media.turns import TakesTurns
 

@@ -9,9 +9,9 @@ import functools
 
 import numpy as np
 import numpy.typing as npt
-from PIL import Image, ImageDraw, ImageFont
 
 from mjcartpole.media.palette import INK, PAPER, Colour
+from mjcartpole.media.pillow import Image, ImageDraw, ImageFont
 
 Pixels = npt.NDArray[np.uint8]
 

@@ -1,12 +1,14 @@
 """Order and growth of errors."""
 
+import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
-from mjcartpole.physics import linear
+from mjcartpole.physics import equations, linear
 from mjcartpole.physics.equations import CARTPOLE_V1
 from mjcartpole.physics.load import load_model
 from mjcartpole.studies.parity import Subject
-from mjcartpole.studies.parity.convergence import _order_figures
+from mjcartpole.studies.parity.convergence import _exact, _order_figures, _start
 from mjcartpole.studies.parity.rounding import EPS
 from mjcartpole.studies.parity.trajectories import predicted_growth
 
@@ -25,3 +27,19 @@ def test_a_predicted_error_grows_with_the_spectral_radius():
     rho = linear.spectral_radius(CARTPOLE_V1, "gym")
     assert bounds[0] == pytest.approx(4 * EPS)
     assert bounds[-1] / bounds[-2] == pytest.approx(rho, rel=1e-6)
+
+
+@pytest.mark.parametrize("edit", ["pole.mass=0.1", "pole.length=0.1", "hinge.damping=2"])
+def test_the_reference_is_that_of_dop853(edit):
+    subject = Subject(load_model("cartpole", edits=[edit]), "itself")
+    duration, exact = _exact(subject)
+    p = subject.reference
+    expected = solve_ivp(
+        lambda _, state: equations.derivative(p, state, p.forces[1]),
+        (0.0, duration),
+        _start(subject),
+        method="DOP853",
+        rtol=1e-13,
+        atol=1e-13,
+    ).y[:, -1]
+    assert np.abs(exact - expected).max() < 1e-12

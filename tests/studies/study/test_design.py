@@ -4,10 +4,11 @@ import doctest
 
 import numpy as np
 import pytest
+from scipy.stats import qmc
 
 from mjcartpole.errors import ConfigError
 from mjcartpole.studies.study import design
-from mjcartpole.studies.study.design import Factor, Range, points_of
+from mjcartpole.studies.study.design import Factor, Range, _shares, points_of
 
 ALPHA = Factor("alpha", Range(0.01, 1.0, log=True))
 TIES = Factor("ties", ("first", "random"))
@@ -71,3 +72,9 @@ def test_too_many_points_are_refused_before_they_are_made():
     levels = tuple(range(1000))
     with pytest.raises(ConfigError, match="make 1,000,000,000 points, and at most 100,000"):
         points_of([Factor(name, levels) for name in "abc"], "grid", 0, 0)
+
+
+@pytest.mark.parametrize(("n", "samples"), [(1, 1), (3, 17)])
+def test_a_latin_hypercube_is_scipys(n, samples):
+    expected = qmc.LatinHypercube(n, seed=np.random.default_rng(7)).random(samples)
+    assert _shares(n, "latin", samples, 7).tobytes() == expected.tobytes()

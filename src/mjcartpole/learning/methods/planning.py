@@ -28,6 +28,7 @@ from mjcartpole.learning.methods.action_values import (
 )
 from mjcartpole.learning.methods.experience import Dynamics, Transition, Vector
 from mjcartpole.learning.methods.parameters import numbers_class
+from mjcartpole.packages import check_installed
 from mjcartpole.task import N_ACTIONS
 
 __all__ = ["after_episode", "greedy_values"]
@@ -71,6 +72,7 @@ def make_memory(p: Any, n_rows: int, rng: np.random.Generator) -> QTable:
 
 def plan(p: Any, memory: QTable, discretizer: Discretizer, dynamics: Dynamics) -> None:
     """Fill the table by value iteration."""
+    check_installed("method planning", "scipy")
     from scipy.sparse import csr_array  # noqa: PLC0415 - it takes a quarter of a second
 
     q = np.asarray(memory.q_table)

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from scipy import stats
 
 from mjcartpole.cores import worker_count
 from mjcartpole.learning.config import TrainConfig
@@ -15,8 +14,10 @@ from mjcartpole.learning.loop import play_episode
 from mjcartpole.learning.training import Training
 from mjcartpole.studies.parity.case import Subject, Vector
 from mjcartpole.studies.parity.result import Figure, Question, Result
+from mjcartpole.studies.parity.significance import STUDENT
 
 SEEDS: Final = 20
+"""`STUDENT` is for as many."""
 BLOCKS: Final = 10
 """The return curve is compared in this many blocks of episodes."""
 
@@ -98,9 +99,8 @@ def _interval(differences: Vector) -> tuple[Vector, Vector]:
 
     The seeds are paired: both backends start from the same table, draws and states.
     """
-    n = len(differences)
     mean, deviation = differences.mean(axis=0), differences.std(axis=0, ddof=1)
-    half = stats.t.ppf(0.5 + CONFIDENCE / 2, n - 1) * deviation / np.sqrt(n)
+    half = STUDENT * deviation / np.sqrt(SEEDS)
     return mean - half, mean + half
 
 

@@ -6,7 +6,6 @@ from typing import Any, NamedTuple
 import gymnasium
 import numpy as np
 import numpy.typing as npt
-from scipy import stats
 
 from mjcartpole.learning.episodes import ENDINGS
 from mjcartpole.learning.loop import play_episode
@@ -14,6 +13,7 @@ from mjcartpole.physics import equations, linear
 from mjcartpole.studies.parity.case import Batch, Subject, Vector
 from mjcartpole.studies.parity.result import Figure, Question, Result
 from mjcartpole.studies.parity.rounding import EPS, LEAST_ARM, STEP_BOUNDS, step_unit
+from mjcartpole.studies.parity.significance import same_distribution, same_frequencies
 
 HORIZON = 400
 
@@ -170,7 +170,7 @@ def closed_loop(subject: Subject) -> Result:
     lengths = [[len(actions) for actions, _ in side] for side in (ours, gyms)]
     figures = (
         Figure(f"episodes that part within {safe} steps ({episodes})", float(too_early), 0.0),
-        Figure("p of equal lengths", _ks(*lengths), SIGNIFICANCE, at_least=True),
+        Figure("p of equal lengths", same_distribution(*lengths), SIGNIFICANCE, at_least=True),
         Figure("p of equal endings", _chi2(ours, gyms), SIGNIFICANCE, at_least=True),
         Figure("mean length on MuJoCo", float(np.mean(lengths[0]))),
         Figure("mean length on gymnasium", float(np.mean(lengths[1]))),
@@ -193,17 +193,9 @@ def _play(env: gymnasium.Env[Any, Any], subject: Subject, seed: int) -> Played:
     return actions, episode.ending
 
 
-def _ks(a: list[int], b: list[int]) -> float:
-    """Return p of the Kolmogorov-Smirnov test that two samples come from one distribution."""
-    return float(stats.ks_2samp(a, b, method="asymp").pvalue)
-
-
 def _chi2(ours: list[Played], gyms: list[Played]) -> float:
     """Return p of the chi-squared test that the three endings are as frequent on both sides."""
     counts = np.array(
         [[sum(end == name for _, end in side) for name in ENDINGS] for side in (ours, gyms)]
     )
-    seen = counts[:, counts.sum(axis=0) > 0]
-    if seen.shape[1] < 2:
-        return 1.0
-    return float(stats.chi2_contingency(seen).pvalue)
+    return same_frequencies(counts)

@@ -9,7 +9,6 @@ import contextlib
 import dataclasses
 import functools
 import hashlib
-import importlib.util
 import logging
 import re
 import tempfile
@@ -25,6 +24,7 @@ import mjcartpole
 from mjcartpole.disturbances.disturbances import Disturbances
 from mjcartpole.errors import ConfigError, MjCartPoleError
 from mjcartpole.files import brief, read_bytes
+from mjcartpole.packages import check_installed
 from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.load import load_stored
 from mjcartpole.studies.multi_seed import SeedJob
@@ -49,7 +49,6 @@ _START: Final = (
     "tcp://127.0.0.1:8786"
 )
 _log = logging.getLogger("mjcartpole")
-_MISSING: Final = "a cluster needs the package distributed: pip install 'mjcartpole[dask]'"
 
 
 @dataclass(frozen=True)
@@ -134,8 +133,7 @@ def connected(address: str) -> Iterator[Any]:
     Raises:
         ConfigError: It does not answer, or a worker has other versions.
     """
-    if not importlib.util.find_spec("distributed"):
-        raise ConfigError(_MISSING)
+    check_installed("a cluster", "distributed")
     if not _ADDRESS.fullmatch(address):
         raise ConfigError(f"{address!r} is no address of a scheduler; {_START}")
     client = _client(address)

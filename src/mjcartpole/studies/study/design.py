@@ -126,6 +126,9 @@ def _shares(n: int, design: Design, samples: int, seed: int) -> npt.NDArray[np.f
     rng = np.random.default_rng(seed)
     if design == "random":
         return rng.random((samples, n))
-    from scipy.stats import qmc  # noqa: PLC0415 - it is heavy
-
-    return np.asarray(qmc.LatinHypercube(n, seed=rng).random(samples))
+    # McKay, Beckman and Conover (1979, doi:10.2307/1268522): one point in each of as many strata.
+    (rng,) = rng.spawn(1)
+    within, strata = rng.random((samples, n)), np.tile(np.arange(1, samples + 1), (n, 1))
+    for column in strata:
+        rng.shuffle(column)
+    return np.asarray((strata.T - within) / samples)

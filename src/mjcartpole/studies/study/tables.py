@@ -1,12 +1,12 @@
 """The tables of a study: a row for each run, and the points of all learning curves."""
 
 import hashlib
-import importlib.util
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, Final
 
 from mjcartpole.files import atomic_write, csv_text, write_whole
+from mjcartpole.packages import is_installed
 from mjcartpole.studies.study.measures import APART
 from mjcartpole.studies.study.plan import Plan, PlannedRun
 from mjcartpole.studies.study.records import Record
@@ -75,14 +75,14 @@ def write_parquet(table: Path, target: Path) -> None:
         FileError: It cannot be written.
     """
     # Digits alone would else be a number.
-    if importlib.util.find_spec("pyarrow"):
+    if is_installed("pyarrow"):
         import pyarrow  # noqa: PLC0415 - an optional package
         from pyarrow import csv, parquet  # noqa: PLC0415
 
         options = csv.ConvertOptions(column_types={"key": pyarrow.string()})
         with atomic_write(target) as temporary:
             parquet.write_table(csv.read_csv(table, convert_options=options), temporary)
-    elif importlib.util.find_spec("duckdb"):
+    elif is_installed("duckdb"):
         import duckdb  # noqa: PLC0415 - an optional package
 
         with atomic_write(target) as temporary, duckdb.connect() as connection:
