@@ -5,9 +5,11 @@ VENV ?= .venv
 # A file of versions to keep to: make test CONSTRAINTS=constraints/ci.txt
 CONSTRAINTS ?=
 BIN = $(VENV)/bin
+# Every warning fails, once all are told; a reference to nothing is one.
+STRICT = --fail-on-warning --keep-going --nitpicky --quiet --doctree-dir build/doctrees
 INSTALL = $(BIN)/python -m pip install --quiet --disable-pip-version-check $(CONSTRAINTS:%=--constraint %)
 
-.PHONY: help train page test-page test test-all coverage lint bench constraints clean
+.PHONY: help train page test-page test test-all coverage lint bench docs docs-links constraints clean
 .DELETE_ON_ERROR:
 
 help:
@@ -18,6 +20,8 @@ help:
 	@echo "make test-all  the same with the slow tests"
 	@echo "make coverage  the fast tests, and which lines they do not reach"
 	@echo "make bench     how fast it is, as ratios to gymnasium and MuJoCo alone"
+	@echo "make docs      the site, into build/site (with the page at work, after \`make page\`)"
+	@echo "make docs-links  the same, asking of every address whether it is there"
 	@echo "make constraints  write anew which versions CI installs"
 	@echo "make clean     remove the virtual environment and caches; runs and videos stay"
 
@@ -48,6 +52,13 @@ coverage: $(VENV)/installed-dev
 bench: $(VENV)/installed-dev
 	$(BIN)/python -m benchmarks.bench $(ARGS)
 
+docs: $(VENV)/installed-docs
+	$(BIN)/python -m sphinx $(STRICT) -b html docs build/site
+	@echo "build/site/index.html"
+
+docs-links: $(VENV)/installed-docs
+	$(BIN)/python -m sphinx $(STRICT) -b linkcheck docs build/links
+
 lint: $(VENV)/installed-dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
@@ -66,15 +77,19 @@ $(VENV)/installed-dev: $(VENV)/installed
 	$(INSTALL) --editable '.[dev]'
 	@touch $@
 
+$(VENV)/installed-docs: $(VENV)/installed
+	$(INSTALL) --editable '.[docs]'
+	@touch $@
+
 # A fresh environment, so that nothing is pinned that nobody needs.
 constraints:
 	$(PYTHON) scripts/lowest_versions.py
 	fresh=$$(mktemp -d) && trap 'rm -rf "$$fresh"' EXIT && $(PYTHON) -m venv "$$fresh" && \
-	  "$$fresh/bin/pip" install --quiet --disable-pip-version-check --editable '.[dev]' && { \
+	  "$$fresh/bin/pip" install --quiet --disable-pip-version-check --editable '.[dev,docs]' && { \
 	  echo "# The versions that CI installs, on Linux with the lowest Python that is supported."; \
 	  echo "# Made by: make constraints (pip freeze --exclude-editable in a fresh environment)"; \
 	  "$$fresh/bin/pip" freeze --exclude-editable; } > constraints/new.txt && \
 	  mv constraints/new.txt constraints/ci.txt
 
 clean:
-	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache .hypothesis .coverage
+	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache .hypothesis .coverage build docs/generated

@@ -36,6 +36,8 @@ ROOT = Path(__file__).resolve().parents[1]
 PAGES = ("README.md", *sorted(f"docs/{path.name}" for path in (ROOT / "docs").glob("*.md")))
 COMMAND = re.compile(r"(?:\.venv/bin/)?(?:mjcartpole|make|python3?|pip|ruff) \S")
 PATIENCE = 900
+NAVIGATION = "```{toctree}"
+"""A list of pages for the site."""
 
 FAST = {
     "README.md": {"make train", "import gymnasium"},
@@ -130,11 +132,12 @@ def read(page: str) -> str:
 
 def blocks(page: str) -> Iterator[Block]:
     """All blocks of a page, and the commands that stand in its sentences, in reading order."""
-    fenced, indented = r"^```\w*\n(?s:.*?)^```$", r"(?:^ {4}.*\n(?:\n(?= {4}))*)+"
+    fenced, indented = r"^```.*\n(?s:.*?)^```$", r"(?:^ {4}.*\n(?:\n(?= {4}))*)+"
     for piece in re.split(f"({fenced}|{indented})", read(page), flags=re.MULTILINE):
         if piece.startswith("```"):
             head, text = piece.split("\n", 1)
-            yield Block(head.strip("`") or "plain", text.removesuffix("```"))
+            if head != NAVIGATION:
+                yield Block(head.strip("`") or "plain", text.removesuffix("```"))
         elif piece.startswith("    "):
             yield from _indented(textwrap.dedent(piece).strip("\n"))
         else:
@@ -276,6 +279,8 @@ def checkout(tmp_path_factory):
         ".venv",
         ".*_cache",
         ".hypothesis",
+        "build",
+        "generated",
         "__pycache__",
         "runs",
         "transfer",
@@ -360,7 +365,17 @@ def test_every_command_is_understood():
 def test_what_a_page_links_to_is_there(page):
     targets = re.findall(r"\]\(([^)#]+)\)", read(page))
     beside = (ROOT / page).parent
-    assert [link for link in targets if "://" not in link and not (beside / link).exists()] == []
+    missing = [link for link in targets if "://" not in link and not (beside / link).exists()]
+    assert [link for link in missing if not link.startswith("generated/")] == []
+
+
+def test_the_site_leads_to_every_page():
+    trees = re.findall(rf"{NAVIGATION}\n(.*?)```", read("docs/index.md"), re.DOTALL)
+    lines = [line for tree in trees for line in tree.split("\n")]
+    listed = [line for line in lines if line and not line.startswith(":")]
+    pages = {Path(page).stem for page in PAGES[1:]} - {"index"}
+    assert sorted(pages - set(listed)) == []
+    assert len(listed) == len(set(listed))
 
 
 @pytest.mark.parametrize("page", PAGES)

@@ -26,7 +26,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 METHODS_FOLDER = "src/mjcartpole/learning/methods"
 GITHUB = sorted(path.relative_to(ROOT).as_posix() for path in (ROOT / ".github").rglob("*.yml"))
-YAML = [*GITHUB, "CITATION.cff", ".pre-commit-config.yaml"]
+YAML = [*GITHUB, "CITATION.cff", ".readthedocs.yaml", ".pre-commit-config.yaml"]
 LONGEST = 400  # lines of a file
 CUT = re.compile(r"^[ +]*…\n", re.MULTILINE)
 
@@ -76,7 +76,11 @@ def test_a_workflow_may_only_read_unless_it_publishes(name):
     workflow = parse(name)
     assert workflow["permissions"] == {"contents": "read"}
     rights = {job: of["permissions"] for job, of in workflow["jobs"].items() if "permissions" in of}
-    assert rights == ({"publish": {"id-token": "write"}} if "release" in name else {})
+    publishing = {
+        "release": {"publish": {"id-token": "write"}},
+        "docs": {"publish": {"id-token": "write", "pages": "write"}},
+    }
+    assert rights == publishing.get(Path(name).stem, {})
     for job in workflow["jobs"].values():
         assert job["timeout-minutes"] and job["steps"]
 
