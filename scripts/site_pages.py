@@ -16,7 +16,7 @@ import numpy as np
 from PIL import Image
 
 import mjcartpole
-from mjcartpole import cli
+from mjcartpole.commands.parsing import parse
 from mjcartpole.commands.registry import COMMANDS, name_of
 from mjcartpole.envs.cartpole import CartPoleEnv
 from mjcartpole.page.document import ASSETS
@@ -66,7 +66,7 @@ def said_by(*words: str) -> str:
     """Return what a command of ours prints."""
     said = io.TextIOWrapper(io.BytesIO(), "utf-8", write_through=True)  # so that help has its boxes
     with contextlib.redirect_stdout(said), contextlib.suppress(SystemExit):
-        cli.parse(words).run()
+        parse(words).run()
     said.seek(0)
     return said.read()
 
