@@ -85,7 +85,7 @@ $(VENV)/installed-docs: $(VENV)/installed
 constraints:
 	$(PYTHON) scripts/lowest_versions.py
 	fresh=$$(mktemp -d) && trap 'rm -rf "$$fresh"' EXIT && $(PYTHON) -m venv "$$fresh" && \
-	  "$$fresh/bin/pip" install --quiet --disable-pip-version-check --editable '.[dev,docs]' && { \
+	  "$$fresh/bin/pip" install --quiet --disable-pip-version-check --editable '.[dev,docs,dask,deep]' && { \
 	  echo "# The versions that CI installs, on Linux with the lowest Python that is supported."; \
 	  echo "# Made by: make constraints (pip freeze --exclude-editable in a fresh environment)"; \
 	  "$$fresh/bin/pip" freeze --exclude-editable; } > constraints/new.txt && \
