@@ -275,7 +275,7 @@ def test_a_diverging_model_is_an_error_on_any_thread(integrator):
 @pytest.mark.parametrize("integrator", ["gym", "mujoco"])
 def test_what_mujoco_gives_up_on_is_an_error_of_ours(integrator, threads):
     # Too little memory for the contacts with the stops.
-    tight = changed_text(*TOUCHING, ("<option", '<size memory="11000"/><option'))
+    tight = changed_text(*TOUCHING, ("<option", '<size memory="7000"/><option'))
     # A document that asks for that is refused; a specification is the caller's own.
     model = mujoco.MjSpec.from_string(tight)
     envs = CartPoleVectorEnv(8, model=model, integrator=integrator, threads=threads)

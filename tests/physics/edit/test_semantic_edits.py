@@ -19,6 +19,9 @@ from mjcartpole.physics.parameters import differences, read_parameters
 from mjcartpole.physics.unmodelled_effects import beyond_equations
 from nightly import examples
 
+MUJOCO_3 = mujoco.__version__.startswith("3.")
+only_mujoco_3 = pytest.mark.skipif(not MUJOCO_3, reason="MuJoCo 4 reads every double")
+
 REFERENCE = load_model("cartpole").xml
 BOB = load_model("bob").xml
 
@@ -249,10 +252,18 @@ def test_what_is_fixed_to_the_pole_moves_along():
     assert found.inertia == pytest.approx(inertia, rel=1e-12)
 
 
+@only_mujoco_3
 def test_a_number_that_mujoco_does_not_read_is_one_line():
     """It calls a number too large that is too small for a double of full precision."""
     with pytest.raises(ModelSyntaxError, match="number is too large in attribute 'damping'"):
         load_model("cartpole", {"hinge.damping": 1e-310, "pole.length": 2})
+
+
+@pytest.mark.skipif(MUJOCO_3, reason="MuJoCo 3 does not read it")
+def test_the_smallest_numbers_are_read():
+    cartpole = load_model("cartpole", {"gravity": 1e-310, "hinge.damping": 5e-324})
+    assert cartpole.model.opt.gravity[2] == -1e-310
+    assert cartpole.model.dof_damping[cartpole.hinges[0]] == 5e-324
 
 
 def test_horizontal_gravity_stays():
@@ -310,6 +321,7 @@ def test_in_one_step_is_the_same_as_step_by_step(name):
     assert first.text == second.text != cartpole.xml
 
 
+@only_mujoco_3
 @pytest.mark.parametrize(
     ("edits", "who"),
     [
