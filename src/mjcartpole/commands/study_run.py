@@ -34,6 +34,7 @@ def run(file: Path, folder: Path, how: StudyOptions) -> int:
         Interrupted: After Ctrl-C, SIGTERM or SIGHUP, when what is done is kept.
     """
     silence_mujoco()
+    worker_count(how.workers, 1)  # What makes no sense is refused before a folder is claimed.
     planned, signals = plan(read_study(file), how.engine), StopSignals()
     cluster = connected(how.scheduler) if how.scheduler else contextlib.nullcontext()
     with signals.caught(), cluster as client:

@@ -87,7 +87,9 @@ def test_what_is_missing_is_named():
         pass
 
 
-@pytest.mark.parametrize("address", ["", "nothing", "tcp://", "tcp://a b:1", "host:port"])
+@pytest.mark.parametrize(
+    "address", ["", "nothing", "tcp://", "tcp://a b:1", "host:port", "http://a:1"]
+)
 def test_what_is_no_address_is_refused(address, monkeypatch):
     monkeypatch.setattr(cluster.importlib.util, "find_spec", lambda name: True)
     with pytest.raises(ConfigError, match="is no address of a scheduler"), connected(address):

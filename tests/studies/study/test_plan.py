@@ -70,7 +70,7 @@ def test_a_mistake_of_many_points_is_told_once():
     with pytest.raises(ConfigError) as refused:
         planned({"gamma": [0.9, 2.0], "alpha": [0.1, 0.2, 0.3]})
     (line,) = str(refused.value).split("\n")
-    assert line.startswith("gamma=2.0 alpha=0.1 (and 2 points more): gamma must be")
+    assert line.startswith("gamma=2.0 alpha=0.1 (and 2 more points): gamma must be")
 
 
 def test_to_say_when_it_was_solved_a_training_is_evaluated():

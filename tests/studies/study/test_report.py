@@ -220,14 +220,32 @@ def test_points_and_runs_that_are_alike_are_counted(tmp_path):
         "(95 % 500 to 500, 4 runs); no factor explains more of the variance than chance would."
     )
     worst = next(each for each in solved.tables if each.title == "worst runs")
-    assert worst.note == "11 more are as bad as the last of these."
+    assert worst.note == "As bad as the last of these: 11 more."
     assert "16 of 16 runs never came to it" in solved.tables[1].note
+
+
+def test_a_single_run_has_no_interval(tmp_path):
+    results = read_results(write(tmp_path / "mine", rows()[:1]))
+    assert table(results, "greedy_mean", "points")[0]["95 %"] == ""
+    assert list(table(results, "greedy_mean", "alpha: performance profile")[0]) == [
+        "alpha",
+        "more than 200",
+    ]
+    (section, _) = sections(results, results.baseline(()))
+    assert ": IQM 200 (1 run); no factor" in section.sentence
+    assert results.left == 15
+
+
+def test_points_with_a_single_seed_are_pooled(tmp_path):
+    results = read_results(write(tmp_path / "mine", rows()[::4]))
+    high = table(results, "greedy_mean", "alpha")[1]
+    assert (high["runs"], high["95 %"]) == ("2", "300 to 350")
 
 
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ({"alpha": "0.7"}, "is no table of this study"),
+        ({"alpha": "0.7"}, r"is no table of this study \(alpha has no level '0\.7'\)"),
         ({"greedy_mean": "much"}, "is no table of this study"),
         ({"greedy_mean": ""}, "greedy_mean is missing in a run that did not fail"),
         ({"point": "x"}, "is no table of this study"),
@@ -246,7 +264,13 @@ def test_what_is_no_study_is_refused(tmp_path):
     with pytest.raises(RunError, match=r"has no runs\.csv"):
         read_results(tmp_path)
     (tmp_path / "runs.csv").write_text("error\n")
-    with pytest.raises(RunError, match="no run in it was done"):
+    with pytest.raises(RunError, match=r"no run in '.*runs\.csv' was done without an error$"):
+        read_results(tmp_path)
+    (tmp_path / "runs.csv").write_text("error\nit diverged\n")
+    with pytest.raises(RunError, match="was done without an error; the first failed: it diverged"):
+        read_results(tmp_path)
+    (tmp_path / "runs.csv").write_text("point,seed,error\n1,0,\n")
+    with pytest.raises(RunError, match=r"no table of this study \(it has no column greedy_mean\)"):
         read_results(tmp_path)
 
 

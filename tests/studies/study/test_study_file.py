@@ -113,6 +113,12 @@ def test_all_mistakes_are_told_at_once():
     assert len(many) == 21 and many[-1] == "and 79 mistakes more"
 
 
+def test_tables_that_are_too_deep_are_refused(tmp_path):
+    (tmp_path / "a.toml").write_text(f"[factors.{'.'.join('a' * 3000)}]\nx = 1")
+    with pytest.raises(FileError, match="is no study: tables or lists in it are too deep"):
+        read_study(tmp_path / "a.toml")
+
+
 @pytest.mark.parametrize(
     "content",
     [b"\xff\xfe", b"a = ", b"a = " + b"[" * 100_000, b"a = " + b"9" * 5000, b"[a]\n[a]"],

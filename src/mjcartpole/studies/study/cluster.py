@@ -43,7 +43,7 @@ _FOLDERS: Final = ("disturbances", "physics", "envs", "learning")
 _DECIDING: Final = ("*.py", *(f"{name}/**/*.py" for name in _FOLDERS))
 """What of this package decides the bits of a training."""
 
-_ADDRESS: Final = re.compile(r"(\w+://)?[^\s/]+:\d{1,5}")
+_ADDRESS: Final = re.compile(r"((tcp|tls|ucx|ws|wss)://)?[^\s/]+:\d{1,5}")
 _START: Final = (
     "start one with `dask scheduler`, and give the address that it prints, such as "
     "tcp://127.0.0.1:8786"

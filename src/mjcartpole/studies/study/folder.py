@@ -30,7 +30,7 @@ def claimed_study(folder: Path, text: str, resume: bool, overwrite: bool) -> Ite
     """Hold a study's folder, and write what is asked into it.
 
     Raises:
-        RunError: Another study is there or at work, or none where one is to go on.
+        RunError: Another study is there or at work, or files that are none.
         FileError: The folder cannot be written.
     """
     _check(folder, resume, overwrite)

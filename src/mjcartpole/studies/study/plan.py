@@ -95,7 +95,8 @@ def in_words(point: Point) -> str:
 
 
 def _told(error: str, points: list[Point]) -> str:
-    others = f" (and {len(points) - 1:,} points more)" if points[1:] else ""
+    more = len(points) - 1
+    others = f" (and {more:,} more point{'s' if more > 1 else ''})" if more else ""
     return f"{in_words(points[0])}{others}: {error}"
 
 

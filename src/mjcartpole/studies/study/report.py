@@ -125,7 +125,8 @@ class OfMeasure:
         scores: Array = self.scores[chosen]
         points = self.results.points[chosen]
         numbers, counts = np.unique(points, return_counts=True)
-        if self.results.study.design != "grid" or (counts != counts[0]).any():
+        # A task with a single run would leave the bootstrap nothing to draw.
+        if self.results.study.design != "grid" or (counts != max(2, counts[0])).any():
             return scores
         order = np.argsort(points, kind="stable")
         by_point: Array = scores[order].reshape(len(numbers), -1).T
@@ -192,7 +193,7 @@ def _of_runs(of: OfMeasure, chosen: Labels) -> tuple[str, ...]:
     scores = of.of_runs(chosen)
     worst = _number(of.sign * float((of.sign * scores).min()))
     solved = () if of.solved.all() else (f"{of.solved[chosen].mean():.0%}",)
-    return (str(scores.size), *_average(iqm(scores), interval_of(scores)), worst, *solved)
+    return (str(scores.size), *_average(scores), worst, *solved)
 
 
 def _factor(of: OfMeasure, levels: Levels, base: str) -> Table:
@@ -218,7 +219,7 @@ def _improvement(x: Array, y: Array) -> tuple[str, str]:
 def _profile(of: OfMeasure, levels: Levels) -> Table:
     """Return which share of a level's runs is better than each of some values."""
     ends = float(of.scores.min()), float(of.scores.max())
-    at = np.linspace(*ends, THRESHOLDS + 2)[1:-1]
+    at = np.unique(np.linspace(*ends, THRESHOLDS + 2)[1:-1])
     rows = []
     for place, name in enumerate(levels.names):
         scores = of.sign * of.of_level(levels, place)
@@ -242,8 +243,8 @@ def _pair(of: OfMeasure, one: Levels, other: Levels) -> Table:
 
 
 def _cell(scores: Array) -> str:
-    middle, interval = _average(iqm(scores), interval_of(scores), digits=4)
-    return f"{middle} ({interval})"
+    middle, interval = _average(scores, digits=4)
+    return f"{middle} ({interval})" if interval else middle
 
 
 def _sensitivity(of: OfMeasure, shares: dict[tuple[str, ...], float]) -> Table:
@@ -267,9 +268,9 @@ def _worst(of: OfMeasure) -> list[Table]:
     order = np.argsort(of.sign * of.scores, kind="stable")[:WORST]
     seeds = np.array(of.results.seeds, dtype=object)
     rows = [(str(seeds[run]), of.results.words[run], _number(of.scores[run])) for run in order]
-    alike = np.count_nonzero(of.scores == of.scores[order[-1]])
-    among = np.count_nonzero(of.scores[order] == of.scores[order[-1]])
-    note = f"{alike - among} more are as bad as the last of these." if alike > among else ""
+    alike = of.scores == of.scores[order[-1]]
+    more = np.count_nonzero(alike) - np.count_nonzero(alike[order])
+    note = f"As bad as the last of these: {more} more." if more else ""
     means = {seed: float(of.scores[seeds == seed].mean()) for seed in dict.fromkeys(seeds)}
     ranked = sorted(means, key=lambda seed: of.sign * means[seed])[:WORST]
     return [
@@ -291,9 +292,10 @@ def _number(value: float, digits: int = 5) -> str:
     return f"{value:,.0f}" if abs(value) >= 10_000 else f"{value:.{digits}g}"
 
 
-def _average(middle: float, interval: Interval, digits: int = 5) -> tuple[str, str]:
-    low, high = (_number(end, digits) for end in interval)
-    return _number(middle, digits), f"{low} to {high}"
+def _average(scores: Array, digits: int = 5) -> tuple[str, str]:
+    """Return an average, and its interval; of a single run there is none."""
+    low, high = (_number(end, digits) for end in interval_of(scores))
+    return _number(iqm(scores), digits), f"{low} to {high}" if scores.size > 1 else ""
 
 
 def _unsolved(of: OfMeasure) -> str:
@@ -312,13 +314,13 @@ def _sentence(
     shares: dict[tuple[str, ...], float],
 ) -> str:
     best = points[0]
-    scores = of.scores[best]
-    middle, interval = _average(iqm(scores), interval_of(scores))
+    middle, interval = _average(of.scores[best])
+    trust = f"95 % {interval}, {len(best)} runs" if interval else "1 run"
     alike = sum(of.rank(runs) == of.rank(best) for runs in points[1:])
     said = (
         f"Best by {of.measure} is {of.results.words[best[0]]}"
         + (f" (and {alike} of {len(points)} points that are as good)" if alike else "")
-        + f": IQM {middle} (95 % {interval}, {len(scores)} runs)"
+        + f": IQM {middle} ({trust})"
     )
     names, share = max(shares.items(), key=lambda item: item[1])
     if share <= of.by_chance(names):

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from mjcartpole.errors import RunError, check_known
 from mjcartpole.files import brief, is_file, read_bytes
-from mjcartpole.studies.study.design import Factor, Range
+from mjcartpole.studies.study.design import Factor, Range, points_of
 from mjcartpole.studies.study.folder import STUDY
 from mjcartpole.studies.study.measures import MEASURES
 from mjcartpole.studies.study.settings import as_text
@@ -65,6 +65,13 @@ class Results:
     solved: Mapping[str, npt.NDArray[np.bool_]]
     failed: int
 
+    @property
+    def left(self) -> int:
+        """How many runs of the study have come to nothing yet."""
+        asked = self.study
+        points = points_of(asked.factors, asked.design, asked.samples, asked.design_seed)
+        return len(points) * len(asked.seeds) - len(self.seeds) - self.failed
+
     def baseline(self, given: Sequence[str]) -> dict[str, str]:
         """Return the level of each factor that others are held against.
 
@@ -100,18 +107,22 @@ def read_results(folder: Path) -> Results:
     study = read_study(folder / STUDY)
     try:
         text = read_bytes(folder / RUNS, MOST_BYTES, refusal=RunError).decode()
-        return _results(study, list(csv.DictReader(io.StringIO(text), strict=True)))
+        rows = list(csv.DictReader(io.StringIO(text), strict=True))
+        if good := [row for row in rows if not row["error"]]:
+            return _results(study, good, len(rows) - len(good))
     except (ValueError, KeyError, TypeError, csv.Error) as error:
         raise RunError(
             f"'{folder / RUNS}' is no table of this study ({brief(error)}); write it anew: "
             "mjcartpole study FILE.toml --resume"
         ) from error
+    first = f"; the first failed: {rows[0]['error']}" if rows else ""
+    raise RunError(f"no run in '{folder / RUNS}' was done without an error{first}")
 
 
-def _results(study: Study, rows: list[dict[str, str]]) -> Results:
-    good = [row for row in rows if not row["error"]]
-    if not good:
-        raise ValueError("no run in it was done without an error")
+def _results(study: Study, good: list[dict[str, str]], failed: int) -> Results:
+    needed = ("point", "seed", *study.measure, *(each.name for each in study.factors))
+    if missing := [name for name in needed if name not in good[0]]:
+        raise ValueError(f"it has no column {missing[0]}")
     figures = {name: [_number(row[name]) for row in good] for name in study.measure}
     return Results(
         study,
@@ -121,7 +132,7 @@ def _results(study: Study, rows: list[dict[str, str]]) -> Results:
         tuple(int(row["seed"]) for row in good),
         {name: _scores(name, found, good) for name, found in figures.items()},
         {name: ~np.isnan(found) for name, found in figures.items()},
-        len(rows) - len(good),
+        failed,
     )
 
 
@@ -146,6 +157,8 @@ def _levels(factor: Factor, texts: list[str]) -> Levels:
         names = sorted(there, key=float)
     else:
         names = [name for name in map(as_text, factor.levels) if name in there]
+    if others := there.difference(names):
+        raise ValueError(f"{factor.name} has no level {min(others)!r}")
     places = {name: place for place, name in enumerate(names)}
     return Levels(factor.name, tuple(names), np.array([places[text] for text in texts]))
 

@@ -75,7 +75,10 @@ def read_study(path: Path) -> Study:
         values = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
         raise FileError(f"'{path}' is no TOML: {brief(error)}") from error
-    return study_of(values, text)
+    try:
+        return study_of(values, text)
+    except RecursionError as error:
+        raise FileError(f"'{path}' is no study: tables or lists in it are too deep") from error
 
 
 def study_of(values: Mapping[str, Any], text: str = "") -> Study:
