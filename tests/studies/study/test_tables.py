@@ -46,7 +46,7 @@ def test_where_nothing_is_done_there_are_no_rows(done, tmp_path):
 @pytest.mark.parametrize("package", READERS)
 def test_parquet_says_what_the_table_says(package, tmp_path, monkeypatch):
     pytest.importorskip(package, reason=f"{package} is not installed")
-    monkeypatch.setattr(tables.importlib.util, "find_spec", lambda name: name == package or None)
+    monkeypatch.setattr(tables, "is_installed", lambda name: name == package)
     rows = [{"key": "0123456789012345", "alpha": 0.1}, {"key": "12e4567890123456", "alpha": None}]
     (tmp_path / RUNS).write_text(csv_text(rows))
     write_parquet(tmp_path / RUNS, tmp_path / PARQUET)
@@ -54,6 +54,6 @@ def test_parquet_says_what_the_table_says(package, tmp_path, monkeypatch):
 
 
 def test_without_either_there_is_no_parquet(tmp_path, monkeypatch):
-    monkeypatch.setattr(tables.importlib.util, "find_spec", lambda name: None)
+    monkeypatch.setattr(tables, "is_installed", lambda name: False)
     write_parquet(tmp_path / RUNS, tmp_path / PARQUET)
     assert not (tmp_path / PARQUET).exists()
