@@ -2,6 +2,7 @@
 
 import logging
 import os
+import posixpath
 import re
 import sys
 from pathlib import Path
@@ -38,7 +39,8 @@ myst_enable_extensions = ["colon_fence", "deflist"]
 myst_heading_anchors = 4
 nb_execution_mode = "force"
 nb_execution_raise_on_error = True
-nb_execution_timeout = 300
+nb_execution_in_temp = True
+nb_execution_timeout = 600
 copybutton_exclude = ".linenos, .gp, .go"
 
 suppress_warnings = ["misc.highlighting_failure"]  # quotes are cut, by "…"
@@ -49,6 +51,8 @@ nitpick_ignore_regex = [("py:.*", r".*")]
 autodoc_typehints = "description"
 autodoc_typehints_description_target = "documented_params"
 autodoc_typehints_format = "short"
+toc_object_entries_show_parents = "hide"
+smartquotes_action = "qe"  # dashes stay: they begin flags
 autodoc_member_order = "bysource"
 python_maximum_signature_line_length = 80
 napoleon_use_ivar = True
@@ -65,12 +69,17 @@ def link_outwards(app: Sphinx, page: str, source: list[str]) -> None:
     """Turn links to what lies above docs/ into links to pages, to sources, or into words."""
 
     def turned(match: re.Match[str]) -> str:
-        text, up, path = match.groups()
-        if path in PAGES_ABOVE:
-            return f"[{text}]({'../' * (len(up) // 3 - 1)}{PAGES_ABOVE[path]})"
-        return f"[{text}]({SOURCE_URL}/blob/main/{path})" if SOURCE_URL else text
+        text, target, anchor = match.groups()
+        path = posixpath.normpath(posixpath.join(folder, target))
+        if not path.startswith("../"):
+            return match[0]
+        above = path.removeprefix("../")
+        if above in PAGES_ABOVE:
+            return f"[{text}]({posixpath.relpath(PAGES_ABOVE[above], folder or '.')}{anchor or ''})"
+        return f"[{text}]({SOURCE_URL}/blob/main/{above})" if SOURCE_URL else text
 
-    source[0] = re.sub(r"(?<!!)\[([^\]]+)\]\(((?:\.\./)+)([^)]+)\)", turned, source[0])
+    folder = posixpath.dirname(page)
+    source[0] = re.sub(r"(?<!!)\[(?!!)([^\]]+)\]\((?!\w+:|#)([^)#]+)(#[^)]*)?\)", turned, source[0])
 
 
 def read_markdown(
@@ -83,7 +92,7 @@ def read_markdown(
 
 
 def _table(match: re.Match[str]) -> str:
-    rows = [row.strip("|").split("|") for row in match[0].splitlines() if set(row) > set("|- ")]
+    rows = [row.strip("|").split("|") for row in match[0].splitlines() if set(row) - set("|- ")]
     cells = ("\n     - ".join(cell.strip() for cell in row) for row in rows)
     body = "\n".join(f"   * - {row}" for row in cells)
     return f".. list-table::\n   :header-rows: 1\n\n{body}\n"

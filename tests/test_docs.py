@@ -374,6 +374,7 @@ def test_the_site_leads_to_every_page():
     lines = [line for tree in trees for line in tree.split("\n")]
     listed = [line for line in lines if line and not line.startswith(":")]
     pages = {Path(page).stem for page in PAGES[1:]} - {"index"}
+    pages |= {f"notebooks/{path.stem}" for path in (ROOT / "docs").glob("notebooks/*.ipynb")}
     assert sorted(pages - set(listed)) == []
     assert len(listed) == len(set(listed))
 
