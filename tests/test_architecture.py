@@ -140,7 +140,9 @@ def loaded_after(code):
 
 def test_importing_the_package_is_light():
     heavy = {"mujoco", "numba", "dm_control", "imageio", "OpenGL", "glfw", "PIL", "tyro"}
-    assert not loaded_after("import mjcartpole") & heavy
+    ours = loaded_after("import mjcartpole")
+    assert not ours & heavy
+    assert ours - loaded_after("import gymnasium") == {"mjcartpole"}
 
 
 @pytest.mark.parametrize(

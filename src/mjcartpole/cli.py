@@ -11,7 +11,7 @@ from typing import NoReturn
 
 from mjcartpole import __version__
 from mjcartpole.errors import MjCartPoleError
-from mjcartpole.output import FAILED, has_left, patient_output, stdout_problem
+from mjcartpole.output import ERASE, FAILED, has_left, patient_output, stdout_problem
 from mjcartpole.packages import check_installed
 from mjcartpole.signals import Interrupted, StopSignals
 
@@ -45,7 +45,7 @@ def _exit_code(argv: list[str]) -> int:
 
 
 def _complain(message: str) -> None:
-    print(f"mjcartpole: {message}", file=sys.stderr)
+    print(f"{ERASE if sys.stderr.isatty() else ''}mjcartpole: {message}", file=sys.stderr)
 
 
 def _run(argv: list[str]) -> int:
@@ -70,6 +70,9 @@ def _import_mujoco() -> None:
     signals = StopSignals()
     with signals.caught(), signals.deferred():
         from mjcartpole.commands import policies  # noqa: F401, PLC0415 - not for --help
+        from mjcartpole.physics.library import stop_timers  # noqa: PLC0415
+
+        stop_timers()
     if signals.stop():
         raise Interrupted(number=signals.number)
 

@@ -18,6 +18,9 @@ from typing import TYPE_CHECKING, Any, Final, TextIO
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer
 
+ERASE: Final = "\r\x1b[K"
+"""What empties the line of a terminal that a bar may be on."""
+
 FAILED: Final = 2
 """The exit code of a command that could not do all that was asked of it."""
 

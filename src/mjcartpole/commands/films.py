@@ -1,18 +1,16 @@
 """Films as commands make them: named, drawn with a progress bar, told of."""
 
 import contextlib
-import re
-from collections.abc import Callable, Generator, Mapping, Sequence
+from collections.abc import Callable, Generator, Sequence
 from pathlib import Path
 from typing import Any
 
+from mjcartpole.commands.bar import Bar
 from mjcartpole.commands.options import VIDEOS
+from mjcartpole.commands.own_films import MOST_NAME, own_film
 from mjcartpole.commands.printing import counted, with_added
-from mjcartpole.commands.progress import progress_bar
-from mjcartpole.errors import RunError
 from mjcartpole.files import atomic_write, free_path
 from mjcartpole.learning import runs
-from mjcartpole.learning.documents import read_summary
 from mjcartpole.learning.naming import shortened
 from mjcartpole.learning.training import TrainResult
 from mjcartpole.media.mp4 import why_no_mp4
@@ -28,8 +26,6 @@ SHEET_FRAMES = 10
 """Pictures on a contact sheet."""
 _INSTEAD = {".mp4": (".gif",)}
 """What may be written in an mp4's place (see `write_video`)."""
-MOST_NAME = 216
-"""Bytes of a video's name; that of a file may have 255."""
 MOST_NAMES = 3
 """Runs that a video's file is named after; of more, the first one stands for all."""
 
@@ -97,8 +93,8 @@ def write_film(
 def _with_progress(
     drawn: Film, signals: StopSignals, check: Callable[[], None]
 ) -> Generator[Frame]:
-    with progress_bar() as bar:
-        for frame in bar.track(drawn.frames(), total=drawn.length, description="filming"):
+    with Bar(lambda: "filming", drawn.length, "frames") as bar:
+        for frame in bar.track(drawn.frames()):
             check()
             raise_noted(signals)
             yield frame
@@ -167,18 +163,3 @@ def film_result(
     if written != path:
         summary["video"] = str(written)
         runs.write_summary(folder, summary)
-
-
-def remove_film(folder: Path) -> None:
-    """Remove the film of a run that is about to be replaced, if it is where training puts it."""
-    with contextlib.suppress(RunError):
-        path = own_film(folder, read_summary(folder))
-        if path is not None:
-            path.unlink(missing_ok=True)
-
-
-def own_film(folder: Path, summary: Mapping[str, Any]) -> Path | None:
-    """Return the film that a run's summary names, if a training of it may have written it."""
-    shown, name = Path(str(summary.get("video", ""))), shortened(folder.resolve().name, MOST_NAME)
-    own = re.fullmatch(re.escape(name) + r"(-\d+)?\.(mp4|gif)", shown.name)
-    return shown if own and shown.parent == VIDEOS else None

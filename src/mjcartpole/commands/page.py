@@ -84,7 +84,7 @@ class Page(Command):
 
 def _data(source: Path, setup: "PolicySetup", plots: bool) -> dict[str, Any]:
     """Return the page's data of a run or a policy; gymnasium's is played on the reference model."""
-    from mjcartpole.commands.films import own_film
+    from mjcartpole.commands.own_films import own_film
     from mjcartpole.files import is_file
     from mjcartpole.learning.documents import read_summary
     from mjcartpole.page.run_data import run_data

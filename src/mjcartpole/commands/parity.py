@@ -7,12 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from mjcartpole.commands.bar import Bar
 from mjcartpole.commands.options import Command
 from mjcartpole.files import check_writable, make_folder, write_whole
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
     from mjcartpole.studies.parity import Figure, Result, Subject
 
 QUESTIONS = {
@@ -72,8 +71,6 @@ class Parity(Command):
         return 0 if holds and not (self.strict and subject.numbers) else 1
 
     def _climb(self, subject: "Subject") -> "list[Result]":
-        from rich.console import Console
-
         from mjcartpole.studies.parity import run_ladder
 
         question = QUESTIONS[self.against].format(subject.cartpole.name)
@@ -83,16 +80,15 @@ class Parity(Command):
         if subject.solves_to_the_end:
             print("  dry friction is solved to the end, not to the file's solver tolerance")
         results: list[Result] = []
-        console, ladder = Console(stderr=True), run_ladder(subject, self.rungs)
-        # While it is shown, the status takes stdout over: nothing may be printed then.
-        while (result := _next_result(console, ladder)) is not None:
+        ladder = run_ladder(subject, self.rungs)
+        while (result := _next_result(ladder)) is not None:
             results.append(result)
             _print_result(result)
         return results
 
 
-def _next_result(console: "Console", ladder: "Iterator[Result]") -> "Result | None":
-    with console.status("climbing …"):
+def _next_result(ladder: "Iterator[Result]") -> "Result | None":
+    with Bar(lambda: "climbing …"):
         return next(ladder, None)
 
 

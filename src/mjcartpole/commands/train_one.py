@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from mjcartpole.commands.films import film_result, remove_film
 from mjcartpole.commands.options import VIDEOS
+from mjcartpole.commands.own_films import remove_film
 from mjcartpole.commands.printing import counted, print_evaluation
 from mjcartpole.commands.progress import train_session
 from mjcartpole.commands.train_options import RunLocation, TrainOptions
@@ -102,6 +102,8 @@ def _finish(session: Session, begun: Begun, how: TrainOptions, signals: StopSign
         print_evaluation(greedy)
         print(f"\nrun    {folder}", flush=True)
         if how.video and begun.video:
+            from mjcartpole.commands.films import film_result
+
             film_result(result, begun.cartpole, folder, summary, signals)
         runs.finish_run(folder)
         draw_curve(folder, how)

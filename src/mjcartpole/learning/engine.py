@@ -1,8 +1,6 @@
 """Engines: the loop compiled by Numba, or the reference loop in Python."""
 
 import logging
-import sys
-import threading
 from typing import TYPE_CHECKING, Literal, get_args
 
 from mjcartpole.envs.backend import Backend
@@ -69,25 +67,7 @@ def _why_not_compiled(backend: Backend, cartpole: "CartPole | None", task: Task)
         return missing("it", "numba")
     try:
         # Numba is heavy, and refuses to be imported beside a NumPy that is newer than it knows.
-        _import_numba()
         from mjcartpole.learning import compiled  # noqa: PLC0415
     except (ImportError, OSError) as error:
         return f"Numba does not work: {error}"
     return compiled.unavailable(backend, cartpole, task)
-
-
-def _import_numba() -> None:
-    """Import Numba without SciPy, where no other thread could miss it meanwhile.
-
-    Numba imports SciPy's linear algebra just to know whether it is there: an eighth of the time
-    until a training starts. What it compiles later finds SciPy when it needs it.
-    """
-    if "scipy" in sys.modules or threading.active_count() > 1:
-        return
-    sys.modules["scipy"] = None  # type: ignore[assignment]
-    try:
-        import numba.np.arraymath  # noqa: F401, PLC0415
-    except ModuleNotFoundError:
-        pass  # Whoever needs Numba says so.
-    finally:
-        del sys.modules["scipy"]

@@ -6,6 +6,7 @@ written a second time, in the order of `loop.py`, so that both draw the same num
 alike: tables, returns and policies are equal bit for bit.
 """
 
+import contextlib
 import functools
 import hashlib
 import inspect
@@ -18,6 +19,8 @@ import numba
 import numpy as np
 import numpy.typing as npt
 from numba import types
+from numba.core.caching import FunctionCache
+from numba.core.runtime.nrt import rtsys
 from numba.extending import register_jitable
 
 from mjcartpole import rewards, task
@@ -162,14 +165,22 @@ def _log(columns: Columns, number: int, played: Played) -> None:
     columns.endings[number], columns.sides[number] = played[2], played[3]
 
 
+class _Kept(FunctionCache):
+    """Numba's cache on disk, read without what only compiling needs: half of a training's start."""
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Return what was compiled for these types, or None."""
+        rtsys.initialize(target_context)
+        with self._guard_against_spurious_io_errors():
+            return self._load_overload(sig, target_context)  # type: ignore[no-untyped-call]
+
+
 def _entry(function: F, sources: str) -> F:
     """Compile what Python calls, and keep it on disk, where a folder for that can be written."""
-    jit = functools.partial(numba.njit, error_model="numpy", nogil=True)
-    entry: Any
-    try:
-        entry = jit(cache=bool(sources))(function)
-    except RuntimeError:
-        entry = jit()(function)
+    entry: Any = compiled(function)
+    if sources:
+        with contextlib.suppress(RuntimeError):
+            entry._cache = _Kept(function)  # type: ignore[no-untyped-call]
     return cast(F, entry)
 
 
