@@ -36,12 +36,12 @@ def test_on_a_terminal_it_is_drawn_and_gone_at_the_end(monkeypatch):
     monkeypatch.setenv("COLUMNS", "12")
     monkeypatch.setenv("TERM", "xterm")
     with Bar(lambda: "filming for long", 3) as shown:
-        while not sys.stderr.getvalue():
+        while "filming" not in sys.stderr.getvalue():
             pass
         assert list(shown.track("abc")) == ["a", "b", "c"]
         assert shown.done == 3
     first, *_, last = sys.stderr.getvalue().split(ERASE)[1:]
-    assert (first, last) == ("filming for", "")
+    assert (first, last) == ("filming for", "\x1b[?25h")
 
 
 @pytest.mark.parametrize("dumb", [False, True])

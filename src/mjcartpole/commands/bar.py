@@ -12,6 +12,8 @@ from mjcartpole.output import ERASE
 
 T = TypeVar("T")
 
+_HIDE, _SHOW = "\x1b[?25l", "\x1b[?25h"  # a terminal's cursor
+
 WIDTH: Final = 40
 EVERY: Final = 0.1
 """Seconds between two looks at what has been done."""
@@ -75,7 +77,8 @@ class Bar:
         return f" {minutes // 60}:{minutes % 60:02d}:{seconds:02d}"
 
     def _draw(self) -> None:
+        print(_HIDE, end="", file=sys.stderr)
         while not self._over.wait(EVERY):
             columns = shutil.get_terminal_size().columns - 1
             print(f"{ERASE}{self.line()[:columns]}", end="", file=sys.stderr, flush=True)
-        print(ERASE, end="", file=sys.stderr, flush=True)
+        print(ERASE + _SHOW, end="", file=sys.stderr, flush=True)
