@@ -294,8 +294,19 @@ def test_a_plot_shows_what_its_rows_say(results):
     assert {row["factor"] for row in shown} == {"alpha", "ties"}
     averages = [row["value"] for row in shown if row["what"] == "iqm" and row["factor"] == "alpha"]
     assert averages == [215, 340]
+    cells = [(row["level"], row["at"], row["value"]) for row in shown if "by" in row["what"]]
+    # Alpha is a number, and ties are none: so it lies along the axis.
+    assert [row["factor"] for row in shown][-1] == "ties"
+    assert cells == [
+        ("first", "0.1", 215),
+        ("first", "0.3", 315),
+        ("random", "0.1", 215),
+        ("random", "0.3", 365),
+    ]
     axes = plot.figure().axes
-    assert len(axes) == 4
+    assert len(axes) == 5
+    drawn = [line.get_ydata().tolist() for line in axes[-1].lines]
+    assert drawn == [[215, 315], [215, 365]]
     assert [float(line.get_xdata()[0]) for line in axes[0].lines[1::2]] == averages
 
 
