@@ -9,7 +9,7 @@ BIN = $(VENV)/bin
 STRICT = --fail-on-warning --keep-going --nitpicky --quiet --doctree-dir build/doctrees
 INSTALL = $(BIN)/python -m pip install --quiet --disable-pip-version-check $(CONSTRAINTS:%=--constraint %)
 
-.PHONY: help train page test-page test test-all coverage lint bench docs docs-links constraints clean
+.PHONY: help train page test-page test test-all coverage lint bench docs docs-links release-check constraints clean
 .DELETE_ON_ERROR:
 
 help:
@@ -22,6 +22,7 @@ help:
 	@echo "make bench     how fast it is, as ratios to gymnasium and MuJoCo alone"
 	@echo "make docs      the site, into build/site (with the page at work, after \`make page\`)"
 	@echo "make docs-links  the same, asking of every address whether it is there"
+	@echo "make release-check  build what would be released, and try it out in fresh environments"
 	@echo "make constraints  write anew which versions CI installs"
 	@echo "make clean     remove the virtual environment and caches; runs and videos stay"
 
@@ -58,6 +59,9 @@ docs: $(VENV)/installed-docs
 
 docs-links: $(VENV)/installed-docs
 	$(BIN)/python -m sphinx $(STRICT) -b linkcheck docs build/links
+
+release-check:
+	$(PYTHON) scripts/release_check.py
 
 lint: $(VENV)/installed-dev
 	$(BIN)/ruff check .

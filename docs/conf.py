@@ -35,7 +35,7 @@ html_static_path = ["static"]
 html_css_files = ["site.css"]
 html_extra_path = [path for path in ("generated/live.html",) if (ROOT / "docs" / path).is_file()]
 
-myst_enable_extensions = ["colon_fence", "deflist"]
+myst_enable_extensions = ["deflist", "dollarmath", "html_image"]
 myst_heading_anchors = 4
 nb_execution_mode = "force"
 nb_execution_raise_on_error = True

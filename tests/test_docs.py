@@ -363,7 +363,7 @@ def test_every_command_is_understood():
 
 @pytest.mark.parametrize("page", PAGES)
 def test_what_a_page_links_to_is_there(page):
-    targets = re.findall(r"\]\(([^)#]+)\)", read(page))
+    targets = re.findall(r"(?<=\]\()[^)#]+(?=\))|(?<=src=\")[^\"]+", read(page))
     beside = (ROOT / page).parent
     missing = [link for link in targets if "://" not in link and not (beside / link).exists()]
     assert [link for link in missing if not link.startswith("generated/")] == []

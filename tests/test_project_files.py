@@ -11,6 +11,7 @@ import gymnasium
 import numpy as np
 import pytest
 
+import mjcartpole
 from command_line import call
 from mjcartpole.commands import registry
 from mjcartpole.envs.registration import env_id
@@ -128,6 +129,13 @@ def test_the_citation_is_of_this_version():
     assert re.findall(r"^license: (.*)$", read("CITATION.cff"), re.MULTILINE) == [
         PROJECT["project"]["license"]
     ]
+
+
+def test_the_changelog_and_the_package_are_of_this_version():
+    version = PROJECT["project"]["version"]
+    headings = re.findall(r"^## \[(.+)\]", read("CHANGELOG.md"), re.MULTILINE)
+    assert headings == ["Unreleased"] or version in headings[:2]
+    assert mjcartpole.__version__ == version
 
 
 def test_the_source_distribution_has_what_is_there():
