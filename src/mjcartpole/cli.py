@@ -4,9 +4,11 @@ Results go to stdout, progress and errors to stderr. Exit codes: 0, 2 for a user
 results that could not be printed, 130 after Ctrl-C.
 """
 
+import contextlib
 import logging
+import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import NoReturn
 
 from mjcartpole import __version__
@@ -68,13 +70,26 @@ def _import_mujoco() -> None:
         Interrupted: One came.
     """
     signals = StopSignals()
-    with signals.caught(), signals.deferred():
+    with signals.caught(), signals.deferred(), _no_window_system():
         from mjcartpole.commands import policies  # noqa: F401, PLC0415 - not for --help
         from mjcartpole.physics.library import stop_timers  # noqa: PLC0415
 
         stop_timers()
     if signals.stop():
         raise Interrupted(number=signals.number)
+
+
+@contextlib.contextmanager
+def _no_window_system() -> Iterator[None]:
+    """Have MuJoCo look for none meanwhile: it takes a while, and no command uses its renderer."""
+    wanted = os.environ.get("MUJOCO_GL")
+    os.environ["MUJOCO_GL"] = "disable"
+    try:
+        yield
+    finally:
+        del os.environ["MUJOCO_GL"]
+        if wanted is not None:
+            os.environ["MUJOCO_GL"] = wanted
 
 
 class _ToStderr(logging.Handler):
