@@ -10,7 +10,7 @@ STRICT = --fail-on-warning --keep-going --nitpicky --quiet --doctree-dir build/d
 # Python compiles what it imports; to compile all that is installed is half of the installation's time.
 INSTALL = $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile $(CONSTRAINTS:%=--constraint %)
 
-.PHONY: help train page test-page test test-all coverage lint bench docs docs-links release-check constraints clean
+.PHONY: help train page test-page test test-all test-mujoco4 coverage lint bench docs docs-links release-check constraints clean
 .DELETE_ON_ERROR:
 
 help:
@@ -19,6 +19,7 @@ help:
 	@echo "make test-page the page's own types, lint and tests, and its build, after \`make page\`"
 	@echo "make test      lint, types and the fast tests"
 	@echo "make test-all  the same with the slow tests"
+	@echo "make test-mujoco4  what tells most, with MuJoCo 4 in an environment of its own"
 	@echo "make coverage  the fast tests, and which lines they do not reach"
 	@echo "make bench     how fast it is, as ratios to gymnasium and MuJoCo alone"
 	@echo "make docs      the site, into build/site (with the page at work, after \`make page\`)"
@@ -47,6 +48,18 @@ test: lint
 
 test-all: lint
 	$(BIN)/python -m pytest -q -n auto
+
+# MuJoCo 4 in an environment of its own, by what tells most: bits, environments, both backends, parity.
+MUJOCO4 = $(VENV)-mujoco4
+test-mujoco4:
+	$(PYTHON) -m venv $(MUJOCO4)
+	$(MUJOCO4)/bin/python -m pip install --quiet --disable-pip-version-check --constraint constraints/mujoco4.txt \
+	  --editable . pytest pytest-xdist hypothesis scipy
+	$(MUJOCO4)/bin/python -m pytest -q -n auto -m "not slow" tests/test_golden.py tests/learning/test_golden_tables.py \
+	  tests/physics/test_dm_control.py tests/studies/parity/test_engine_check.py tests/parity tests/envs
+	$(MUJOCO4)/bin/mjcartpole parity --quick
+	runs=$$(mktemp -d) && trap 'rm -rf "$$runs"' EXIT && for backend in mujoco gym; do \
+	  $(MUJOCO4)/bin/mjcartpole train --backend $$backend --no-video --no-curve --run-dir "$$runs/$$backend" || exit; done
 
 coverage: $(VENV)/installed-dev
 	$(BIN)/python -m pytest -q -n auto -m "not slow" --cov --cov-report=term-missing:skip-covered $(ARGS)
@@ -90,11 +103,13 @@ $(VENV)/installed-docs: $(VENV)/installed
 constraints:
 	$(PYTHON) scripts/lowest_versions.py
 	fresh=$$(mktemp -d) && trap 'rm -rf "$$fresh"' EXIT && $(PYTHON) -m venv "$$fresh" && \
-	  "$$fresh/bin/pip" install --quiet --disable-pip-version-check --editable '.[dev,docs,dask,deep]' && { \
-	  echo "# The versions that CI installs, on Linux with the lowest Python that is supported."; \
+	  freeze() { "$$fresh/bin/pip" install --quiet --disable-pip-version-check "$$2" --editable \
+	    '.[dev,docs,dask,deep]' && { \
+	  echo "# The versions that CI installs, on Linux with the lowest Python that is supported, with $$2."; \
 	  echo "# Made by: make constraints (pip freeze --exclude-editable in a fresh environment)"; \
 	  "$$fresh/bin/pip" freeze --exclude-editable; } > constraints/new.txt && \
-	  mv constraints/new.txt constraints/ci.txt
+	  mv constraints/new.txt "constraints/$$1.txt"; } && \
+	  freeze ci 'mujoco<4' && freeze mujoco4 'mujoco>=4'
 
 clean:
-	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache .hypothesis .coverage build docs/generated
+	rm -rf $(VENV) $(MUJOCO4) .pytest_cache .mypy_cache .ruff_cache .hypothesis .coverage build docs/generated

@@ -117,6 +117,14 @@ def test_ci_pins_every_declared_dependency_and_names_no_place():
     assert sorted(set(declared()) - set(versions)) == []
 
 
+def test_ci_takes_both_mujocos_and_all_else_alike():
+    first, second = pinned("constraints/ci.txt"), pinned("constraints/mujoco4.txt")
+    assert (first["mujoco"].split(".")[0], second["mujoco"].split(".")[0]) == ("3", "4")
+    mujoco = {name for name in second if name.startswith("mujoco")}
+    others = [{one: of[one] for one in of if one not in mujoco} for of in (first, second)]
+    assert others[0] == others[1], "run: make constraints"
+
+
 def test_the_lowest_versions_are_those_declared():
     made = runpy.run_path(str(ROOT / "scripts" / "lowest_versions.py"))["lowest"]()
     assert made == read("constraints/lowest.txt"), "run: python scripts/lowest_versions.py"
