@@ -63,6 +63,14 @@ PAGES_ABOVE = {
     f"{name}.md": f"generated/{name.lower()}.md"
     for name in ("CHANGELOG", "CONTRIBUTING", "SECURITY")
 }
+# And words for pages that are on the site only.
+ON_SITE = {
+    "Try it here": "live",
+    "Gallery": "gallery",
+    "Commands": "cli",
+    "The public names": "api",
+    "Modules": "modules",
+}
 
 
 def link_outwards(app: Sphinx, page: str, source: list[str]) -> None:
@@ -79,6 +87,8 @@ def link_outwards(app: Sphinx, page: str, source: list[str]) -> None:
         return f"[{text}]({SOURCE_URL}/blob/main/{above})" if SOURCE_URL else text
 
     folder = posixpath.dirname(page)
+    for words, name in ON_SITE.items():
+        source[0] = source[0].replace(f"*{words}*", f"[{words}](/generated/{name}.md)")
     source[0] = re.sub(r"(?<!!)\[(?!!)([^\]]+)\]\((?!\w+:|#)([^)#]+)(#[^)]*)?\)", turned, source[0])
 
 

@@ -20,6 +20,7 @@ JOBS = (
     "model edit cartpole --set pole.length=1.5 -o mine.xml",
     "train --model mine.xml --run-dir runs/mine --no-video",
 )
+TOOLS = ("build", "twine")
 MADE = ("runs/tuned-mujoco-seed0/policy.json", "film.gif", "runs/mine/policy.json")
 LICENCES = """
 from importlib.metadata import distributions
@@ -94,7 +95,7 @@ def check() -> Iterator[tuple[str, str]]:
     yield "addresses", CLEAN.get("MJCARTPOLE_SOURCE_URL", "none: MJCARTPOLE_SOURCE_URL is not set")
     with tempfile.TemporaryDirectory() as temporary:
         place = Path(temporary)
-        tools = environment(place / "tools", "build", "twine")
+        tools = environment(place / "tools", *TOOLS)
         run(tools / "python", "-m", "build", "--outdir", place / "dist", ROOT)
         archives = sorted((place / "dist").iterdir())
         run(tools / "python", "-m", "twine", "check", "--strict", *archives)
