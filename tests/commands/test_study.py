@@ -139,6 +139,20 @@ def test_each_mistake_has_its_line(ask, capsys):
     assert len(lines) == 2 and all(line.startswith("mjcartpole: error: [") for line in lines)
 
 
+def test_runs_of_other_versions_are_told(ask, capsys):
+    folder = ask()
+    call(["study", "a.toml"], capsys)
+    text = (folder / LOG).read_text()
+    numpy = json.loads(text.splitlines()[0])["versions"]["numpy"]
+    (folder / LOG).write_text(text.replace(f'"numpy": "{numpy}"', '"numpy": "1.0"', 1))
+    code, out, err = call(["study", "a.toml", "--resume"], capsys)
+    assert code == 0 and "8 runs done before, 0 left" in out
+    said = (
+        f"some runs were done before with numpy '1.0' (here '{numpy}'); --overwrite does all anew"
+    )
+    assert err == f"mjcartpole: {said}\n"
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [

@@ -18,7 +18,7 @@ from mjcartpole.studies.study.expect import expect
 from mjcartpole.studies.study.folder import claimed_study
 from mjcartpole.studies.study.measures import MEASURES
 from mjcartpole.studies.study.plan import Plan, PlannedRun, in_words, plan
-from mjcartpole.studies.study.records import RecordLog
+from mjcartpole.studies.study.records import RecordLog, versions
 from mjcartpole.studies.study.runner import keep, left_of, run_here, unique
 from mjcartpole.studies.study.study_file import read_study
 from mjcartpole.studies.study.tables import RUNS, write_tables
@@ -102,7 +102,22 @@ def _print_head(planned: Plan, left: Sequence[PlannedRun], log: RecordLog) -> No
         print(f"mjcartpole: {log.path}: {what} cut short or damaged, left out", file=sys.stderr)
     if done := len(unique(planned)) - len(left):
         print(f"{counted(done, 'run')} done before, {len(left):,} left")
+    if others := _other_versions(planned, log):
+        what = f"some runs were done before with {', '.join(others[:SHOWN])}"
+        print(f"mjcartpole: {what}; --overwrite does all anew", file=sys.stderr)
     sys.stdout.flush()
+
+
+def _other_versions(planned: Plan, log: RecordLog) -> list[str]:
+    done = [log.found[run.key].versions for run in planned.runs if run.key in log.found]
+    return sorted(
+        {
+            f"{name} {there[name]!r} (here {here!r})"
+            for name, here in versions().items()
+            for there in done
+            if there[name] != here
+        }
+    )
 
 
 def _tell_failed(
