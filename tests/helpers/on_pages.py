@@ -10,6 +10,9 @@ NOT_HERE = {
     "pip install 'mjcartpole[tensorboard]'": "it loads packages from an index",
     "pip install 'mjcartpole[plot]'": "it loads packages from an index",
     "pip install 'mjcartpole[dask]'": "it loads packages from an index",
+    "pip install mjcartpole": "it loads packages from an index",
+    "pip install mujoco gymnasium numpy": "it loads packages from an index",
+    "pip install --no-deps mjcartpole": "it loads packages from an index",
     "mjcartpole study docs/study.toml --scheduler tcp://127.0.0.1:8786": "it needs a scheduler",
 }
 """Commands that are not run, and why."""
