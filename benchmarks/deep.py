@@ -34,6 +34,7 @@ from mjcartpole.files import write_whole
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.evaluation import evaluate
 from mjcartpole.learning.training import Training, train
+from mjcartpole.rules import Changes
 from mjcartpole.studies.statistics import Statistic, bootstrap_interval, iqm
 from mjcartpole.task import TASKS, Task
 from mjcartpole.versions import version_of
@@ -60,6 +61,7 @@ class Learner:
         steps: After so many it is given up.
         envs: So many environments give it experience at once.
         task: What it plays, by name.
+        reward: What it learns from, by name; the task's if empty.
         noise: Standard deviation of what is added to its pushes.
         settings: Arguments of its class.
     """
@@ -68,6 +70,7 @@ class Learner:
     steps: int = 0
     envs: int = 1
     task: str = "CartPole-v1"
+    reward: str = ""
     noise: float = 0.0
     settings: dict[str, Any] = field(default_factory=dict)
 
@@ -193,8 +196,9 @@ def train_deep(
 ) -> tuple[Player, int, int, float]:
     """Train a learner of Stable-Baselines3: what plays, episodes, steps, seconds."""
     deep, sb3 = LEARNERS[name], needed()
+    changed: Changes = {"reward": deep.reward} if deep.reward else {}
     world = importlib.import_module("stable_baselines3.common.vec_env").DummyVecEnv(
-        [lambda: make_env(backend, task=deep.task)] * deep.envs
+        [lambda: make_env(backend, task=deep.task, **changed)] * deep.envs
     )
     settings = dict(deep.settings)
     if deep.noise:
@@ -295,7 +299,7 @@ def row(name: str, backend: str, group: list[dict[str, Any]], base: float | None
         f"{sum(one['solved'] for one in group)} of {len(group)}",
         told(group, "episodes", np.median),
         told(group, "steps", np.median),
-        f"{median(group, 'seconds') / base:,.3g}" if base else "",
+        times(median(group, "seconds") / base) if base else "",
         told(group, "greedy", iqm),
         told(group, "carried", iqm),
     ]
@@ -305,6 +309,11 @@ def row(name: str, backend: str, group: list[dict[str, Any]], base: float | None
 def median(group: list[dict[str, Any]], figure: str) -> float:
     """Return the median of a figure over seeds."""
     return float(np.median([one[figure] for one in group]))
+
+
+def times(ratio: float) -> str:
+    """Return a ratio by its first digit: more of it is the machine's."""
+    return f"{float(f'{ratio:.1g}'):,g}"
 
 
 def told(group: list[dict[str, Any]], figure: str, statistic: Statistic) -> str:

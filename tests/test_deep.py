@@ -58,6 +58,12 @@ def test_a_table_of_known_figures():
     assert deep == "| PPO | gym | 4 of 4 | 9 | 100 | 40 | 472 (470 to 473) | 480 |"
 
 
+def test_the_table_on_the_page_is_that_of_the_file_beside_it(call):
+    printed = call("table", ROOT / "docs" / "deep.jsonl")
+    assert len(printed.splitlines()) > 10
+    assert printed in (ROOT / "docs" / "deep.md").read_text(encoding="utf-8")
+
+
 def test_what_is_there_already_is_not_trained_again(call, tmp_path):
     file = tmp_path / "found" / "deep.jsonl"
     words = ("train", file, "--learners", "quick", "--backends", "gym")
@@ -90,6 +96,7 @@ def test_the_checker_of_stable_baselines_has_nothing_to_say(name, settings):
 def test_a_deep_learner_is_measured(name, monkeypatch):
     pytest.importorskip("stable_baselines3", reason=NEEDS)
     learner = DEEP["LEARNERS"][name]
+    assert learner.steps >= 15_000
     monkeypatch.setitem(DEEP["LEARNERS"], name, DEEP["replace"](learner, steps=300))
     found = DEEP["measure"](name, "mujoco", 0)
     assert not found["solved"] and 300 <= found["steps"] < 600 and found["episodes"] > 3

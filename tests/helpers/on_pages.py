@@ -13,12 +13,15 @@ NOT_HERE = {
     "pip install mjcartpole": "it loads packages from an index",
     "pip install mujoco gymnasium numpy": "it loads packages from an index",
     "pip install --no-deps mjcartpole": "it loads packages from an index",
+    "pip install 'mjcartpole[deep]'": "it loads packages from an index",
+    "python benchmarks/deep.py": "it needs PyTorch, and hours",
     "mjcartpole study docs/study.toml --scheduler tcp://127.0.0.1:8786": "it needs a scheduler",
 }
 """Commands that are not run, and why."""
 
 SCALED = {
     r"(?<=benchmarks/learners.py)(.* --seeds) \d+": r"\1 1",
+    r"(?<=benchmarks/deep.py)(.* --seeds) \d+": r"\1 1",
     r"(?<=benchmarks/methods.py)(.* --seeds) \d+ --plot \S+": r"\1 1 --methods sarsa",
     r"(?<=benchmarks/robustness.py)(.* --seeds) \d+": r"\1 1",
     r"(?<=^mjcartpole train --backend gym --seeds) 2000": " 2",
