@@ -35,5 +35,6 @@ SCALED = {
         r"sed -i 's/^seeds = .*/seeds = 1/; s/, 48000, 192000//' \1 && mjcartpole study \1"
     ),
     r"--episodes 192000": "--episodes 2000",
+    r"(?<=^python benchmarks/study.py)$": " --runs 2 --turns 1",
 }
 """What takes many minutes, by the same code over fewer seeds, repeats or pixels."""
