@@ -18,7 +18,7 @@ def test_the_reference_passes_every_rung(against, monkeypatch):
     monkeypatch.setattr(learning, "SEEDS", at_night(learning.SEEDS, fast=4))
     subject, results = climb(REFERENCE, against, tuple(RUNGS))
     if results[10].verdict == "skipped":
-        assert "does not load" in results.pop(10).skipped
+        assert results.pop(10).skipped.startswith(("dm-control ", "dm_control is not"))
     assert {result.verdict for result in results.values()} == {"holds"}
     assert subject.causes == []
     for result in results.values():
