@@ -1,7 +1,9 @@
 """Episodes as generators over any gymnasium environment: the reference loop."""
 
 import contextlib
+import functools
 import math
+import operator
 from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -78,7 +80,9 @@ def _learn_episode(
         raise in_episode(error, number, len(actions)) from error
     episode = Trajectory(states, actions, rewards, len(actions), terminated)
     method.after_episode(p, memory, rates, episode, rng)
-    return _ended(env, number, sum(rewards), len(actions), terminated)
+    # As compiled code adds; `sum` rounds otherwise from Python 3.12 on.
+    total = functools.reduce(operator.add, rewards, 0.0)
+    return _ended(env, number, total, len(actions), terminated)
 
 
 def in_episode(error: SimulationError, number: int, steps: int) -> SimulationError:
