@@ -81,7 +81,9 @@ def controls_of_choices(
         # Together they have no bit but the lowest: each is 0 or 1.
         and np.bitwise_or.reduce(actions) in (0, 1)
     )
-    if not is_plain and not space.contains(actions):
+    # Gymnasium before 1.4 compares whatever there is with numbers, texts and all.
+    is_whole = is_plain or np.can_cast(np.asarray(actions).dtype, np.int64)
+    if not is_plain and not (is_whole and space.contains(actions)):
         n = (space.shape or (0,))[0]
         raise invalid(actions, f"actions are {n} integers, each 0 or 1")
     return controls.take(np.asarray(actions))
