@@ -11,7 +11,7 @@ import os, sys, mjcartpole
 result = mjcartpole.train(mjcartpole.TrainConfig(episodes=2))
 import mjcartpole.commands.policies
 print(result.steps > 0, os.environ["MUJOCO_GL"])
-print({"OpenGL", "imageio", "dm_control", "scipy"} & set(sys.modules))
+print({"OpenGL", "imageio", "dm_control"} & set(sys.modules))
 """
 
 

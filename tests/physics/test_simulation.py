@@ -98,6 +98,7 @@ def test_nothing_of_the_past_remains_in_a_new_state():
 
 
 def test_mujocos_timers_count_since_the_state_was_set():
+    mujoco.set_mjcb_time(None)  # MuJoCo's own clock, which a command in this process has stopped.
     simulation = Simulation(CARTPOLE)
     timer = simulation.data.timer[int(mujoco.mjtTimer.mjTIMER_STEP)]
     simulation.step(1.0)
