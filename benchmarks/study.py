@@ -16,6 +16,7 @@ from typing import Any
 
 from mjcartpole.learning.training import train
 from mjcartpole.packages import is_installed, missing
+from mjcartpole.physics.library import stop_timers
 from mjcartpole.studies.side_by_side import Found
 from mjcartpole.studies.study.cluster import Parcel, connected, run_parcel, run_there
 from mjcartpole.studies.study.plan import PlannedRun, plan
@@ -33,6 +34,7 @@ def main() -> None:
     parser.add_argument("--workers", type=int, default=2, help="threads, or worker processes")
     parser.add_argument("--turns", type=int, default=3)
     asked = parser.parse_args()
+    stop_timers()  # As in a command.
     about = {"seeds": asked.runs, "measure": ["area_under_curve"]}
     runs = plan(study_of({"study": about, "factors": {"alpha": [0.3]}})).runs
     train(runs[0].job.config)  # What is compiled once is no part of it.
