@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from mjcartpole.commands.parsing import parse
+from mjcartpole.commands.registry import name_of
 
 SCRIPT = Path(__file__).resolve().parents[1] / "scripts" / "release_check.py"
 
@@ -18,8 +19,8 @@ def script():
 
 
 def test_its_jobs_are_understood(script):
-    for job in script["JOBS"]:
-        parse(shlex.split(job))
+    found = [name_of(type(parse(shlex.split(job)))) for job in script["JOBS"]]
+    assert found == ["train", "render", "model", "train"]
 
 
 def test_a_command_that_fails_is_told_in_one_line(script):

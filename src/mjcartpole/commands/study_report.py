@@ -49,7 +49,8 @@ def _head(results: Results) -> str:
     differs = [factor.name for factor in results.study.factors]
     base = in_words({name: value for name, value in usual.items() if name not in differs})
     failed = f"; {results.failed:,} more failed, and are left out" if results.failed else ""
-    failed += f"; {results.left:,} more are not done yet" if results.left > 0 else ""
+    left = results.left
+    failed += f"; {left:,} more are not done yet" if left > 0 else ""
     return (
         f"{counted(len(results.seeds), 'run')}{f' of {base}' if base else ''}{failed}. Intervals "
         "are 95 % bootstrap intervals; IQM is the interquartile mean."

@@ -81,9 +81,12 @@ def controls_of_choices(
         # Together they have no bit but the lowest: each is 0 or 1.
         and np.bitwise_or.reduce(actions) in (0, 1)
     )
-    # Gymnasium before 1.4 compares whatever there is with numbers, texts and all.
-    is_whole = is_plain or np.can_cast(np.asarray(actions).dtype, np.int64)
-    if not is_plain and not (is_whole and space.contains(actions)):
+    if not is_plain and not (_are_whole(actions) and space.contains(actions)):
         n = (space.shape or (0,))[0]
         raise invalid(actions, f"actions are {n} integers, each 0 or 1")
     return controls.take(np.asarray(actions))
+
+
+def _are_whole(actions: npt.ArrayLike) -> bool:
+    """Return whether all are whole numbers; gymnasium before 1.4 takes fractions for such."""
+    return np.can_cast(np.asarray(actions).dtype, np.int64)

@@ -118,7 +118,7 @@ class OfMeasure:
 
     def of_level(self, levels: Levels, level: int) -> Array:
         """Return the scores of a level: a column for each point on a full grid, else pooled."""
-        return self.of_runs(np.flatnonzero(levels.labels == level))
+        return self.of_runs(runs_at((levels, level)))
 
     def of_runs(self, chosen: Labels) -> Array:
         """Return the scores of some runs, likewise."""
@@ -174,6 +174,11 @@ def interval_of(scores: Array) -> Interval:
     return bootstrap_interval(scores, resamples=_resamples(scores.size))
 
 
+def runs_at(*levels: tuple[Levels, int]) -> Labels:
+    """Return which runs have a level of each of these factors."""
+    return np.flatnonzero(np.all([each.labels == level for each, level in levels], axis=0))
+
+
 def _resamples(size: int) -> int:
     return max(_LEAST_RESAMPLES, min(RESAMPLES, _MOST_DRAWN // size))
 
@@ -203,7 +208,7 @@ def _factor(of: OfMeasure, levels: Levels, base: str) -> Table:
     for place, name in enumerate(levels.names):
         scores = of.of_level(levels, place)
         better = ("", "") if name == base else _improvement(of.sign * scores, of.sign * against)
-        rows.append((name, *_of_runs(of, np.flatnonzero(levels.labels == place)), *better))
+        rows.append((name, *_of_runs(of, runs_at((levels, place))), *better))
     columns = (levels.name, *_columns(of), f"P(better than {base})", "95 % of P")
     return Table(levels.name, columns, tuple(rows), _unsolved(of))
 
@@ -235,7 +240,7 @@ def _pair(of: OfMeasure, one: Levels, other: Levels) -> Table:
     for place, name in enumerate(one.names):
         cells = []
         for column in range(len(other.names)):
-            chosen = np.flatnonzero((one.labels == place) & (other.labels == column))
+            chosen = runs_at((one, place), (other, column))
             cells.append(_cell(of.of_runs(chosen)) if chosen.size else "")
         rows.append((name, *cells))
     columns = (f"{one.name} \\ {other.name}", *other.names)

@@ -11,7 +11,7 @@ from mjcartpole.media.palette import CURVES
 from mjcartpole.media.plots import plot_style, short
 from mjcartpole.studies.profiles import Profile, performance_profile
 from mjcartpole.studies.statistics import iqm
-from mjcartpole.studies.study.report import OfMeasure, interval_of
+from mjcartpole.studies.study.report import OfMeasure, interval_of, runs_at
 from mjcartpole.studies.study.results import Levels, Results
 
 if TYPE_CHECKING:
@@ -57,10 +57,11 @@ class ReportPlot:
         self, one: Levels, place: int, other: Levels
     ) -> Iterator[tuple[int, float, float, float]]:
         """Yield IQM and interval of a level with each level of another factor that it met."""
+        of = self.of
         for column in range(len(other.names)):
-            chosen = np.flatnonzero((one.labels == place) & (other.labels == column))
+            chosen = runs_at((one, place), (other, column))
             if chosen.size:
-                scores = self.of.of_runs(chosen)
+                scores = of.of_runs(chosen)
                 yield (column, iqm(scores), *interval_of(scores))
 
     def averages(self, levels: Levels) -> Iterator[tuple[str, float, float, float]]:
