@@ -33,8 +33,9 @@ def invalid(name: str, reason: object) -> ModelSyntaxError:
 def stop_timers() -> None:
     """Have MuJoCo take no time of its steps, which is a third of what a step costs.
 
-    For a process of our own, while it has one thread: what `MjData.timer` says of durations is then
-    nothing, and the callback that MuJoCo's package sets cannot be unset in Python.
+    For a process of our own, a command or a cluster's worker, before it steps: what `MjData.timer`
+    says of durations is then nothing, and the callback that MuJoCo's package sets cannot be unset
+    in Python.
     """
     with contextlib.suppress(OSError, ValueError):
         ctypes.c_void_p.in_dll(ctypes.CDLL(str(libmujoco())), "mjcb_time").value = None

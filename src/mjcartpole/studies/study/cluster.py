@@ -26,6 +26,7 @@ from mjcartpole.errors import ConfigError, MjCartPoleError
 from mjcartpole.files import brief, read_bytes
 from mjcartpole.packages import check_installed
 from mjcartpole.physics.cartpole import CartPole
+from mjcartpole.physics.library import stop_timers
 from mjcartpole.physics.load import load_stored
 from mjcartpole.studies.multi_seed import SeedJob
 from mjcartpole.studies.side_by_side import Found, Stop, as_they_come
@@ -49,6 +50,7 @@ _START: Final = (
     "tcp://127.0.0.1:8786"
 )
 _log = logging.getLogger("mjcartpole")
+_stop_timers: Final = functools.cache(stop_timers)  # Once in a worker, before it steps.
 
 
 @dataclass(frozen=True)
@@ -91,6 +93,7 @@ def run_parcel(parcel: Parcel) -> Record | None:
         ConfigError: The worker has other versions than where the run comes from.
     """
     check_versions(versions_here(), parcel.versions, "this worker")
+    _stop_timers()
     with tempfile.TemporaryDirectory() if parcel.files else contextlib.nullcontext("") as folder:
         for name, content in parcel.files.items():
             Path(folder, name).write_bytes(content)
