@@ -10,7 +10,7 @@ STRICT = --fail-on-warning --keep-going --nitpicky --quiet --doctree-dir build/d
 # Python compiles what it imports; to compile all that is installed is half of the installation's time.
 INSTALL = $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile $(CONSTRAINTS:%=--constraint %)
 
-.PHONY: help train page test-page test test-all test-mujoco4 coverage lint bench docs docs-links release-check constraints clean
+.PHONY: help train page test-page test test-ci test-all test-mujoco4 coverage lint bench docs docs-links release-check constraints clean
 .DELETE_ON_ERROR:
 
 help:
@@ -18,9 +18,10 @@ help:
 	@echo "make page      build what \`mjcartpole page\` puts into a page (needs Node.js)"
 	@echo "make test-page the page's own types, lint and tests, and its build, after \`make page\`"
 	@echo "make test      lint, types and the fast tests"
-	@echo "make test-all  the same with the slow tests"
+	@echo "make test-ci   the same with the long tests: whole commands, pages, compilers"
+	@echo "make test-all  every test, those of the night too"
 	@echo "make test-mujoco4  what tells most, with MuJoCo 4 in an environment of its own"
-	@echo "make coverage  the fast tests, and which lines they do not reach"
+	@echo "make coverage  the tests of CI, and which lines they do not reach"
 	@echo "make bench     how fast it is, as ratios to gymnasium and MuJoCo alone"
 	@echo "make docs      the site, into build/site (with the page at work, after \`make page\`)"
 	@echo "make docs-links  the same, asking of every address whether it is there"
@@ -44,6 +45,9 @@ node:
 	@command -v npm >/dev/null || { echo "the page needs Node.js 20 or newer, with npm" >&2; exit 1; }
 
 test: lint
+	$(BIN)/python -m pytest -q -n auto -m "not slow and not long"
+
+test-ci: lint
 	$(BIN)/python -m pytest -q -n auto -m "not slow"
 
 test-all: lint

@@ -55,7 +55,7 @@ def pytest_xdist_make_scheduler(config, log):
 
 def pytest_configure(config):
     """Say which set this is, and hear signals, which are ignored in the background or by nohup."""
-    if config.option.markexpr == "not slow":
+    if "not slow" in config.option.markexpr:
         os.environ[FAST] = "1"
     # How long an example takes says how busy the machine is, and nothing of what is tested.
     options = {"deadline": None, "suppress_health_check": [HealthCheck.too_slow]}

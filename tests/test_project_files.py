@@ -97,6 +97,20 @@ def test_what_a_workflow_names_is_there(name):
             assert (ROOT / one).is_file(), one
 
 
+TIERS = {"test": ' -m "not slow and not long"', "test-ci": ' -m "not slow"', "test-all": ""}
+
+
+def test_each_command_leaves_out_what_it_says():
+    recipes = re.findall(
+        r"^(test[\w-]*): lint\n\t\S+ -m pytest -q -n auto(.*)$", read("Makefile"), re.MULTILINE
+    )
+    assert dict(recipes) == TIERS
+    marks = {mark.split(":")[0] for mark in PROJECT["tool"]["pytest"]["ini_options"]["markers"]}
+    assert marks == set(re.findall(r"not (\w+)", TIERS["test"]))
+    ran = re.findall(r"make (test-ci|test-all|test)\b(?!-)", read(".github/workflows/test.yml"))
+    assert ran == ["test-ci", "test-all"]
+
+
 def test_tests_run_on_every_system_python_and_mujoco():
     matrix = parse(".github/workflows/test.yml")["jobs"]["everywhere"]["strategy"]["matrix"]
     assert [system.split("-")[0] for system in matrix["os"]] == ["ubuntu", "macos", "windows"]

@@ -1,8 +1,6 @@
 """`mjcartpole plot`."""
 
 import csv
-import os
-import subprocess
 import sys
 from pathlib import Path
 
@@ -10,6 +8,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from command_line import done
 from mjcartpole import cli
 from mjcartpole.learning import compiled
 
@@ -33,10 +32,8 @@ def pixels(path):
 def runs(tmp_path_factory):
     """A folder with a run, and with many seeds, trained as the command line does it."""
     folder = tmp_path_factory.mktemp("plots")
-    environment = {**os.environ, "PYTHONPATH": str(Path(cli.__file__).parents[1])}
-    for more in (["--run-dir", "one"], ["--seeds", "2", "--run-dir", "many"]):
-        command = [sys.executable, "-m", "mjcartpole", *TRAIN, *more]
-        subprocess.run(command, cwd=folder, env=environment, check=True, capture_output=True)
+    for name, more in (("one", []), ("many", ["--seeds", "2"])):
+        done([*TRAIN, *more, "--run-dir", folder / name])
     return folder
 
 

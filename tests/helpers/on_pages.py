@@ -3,7 +3,7 @@
 NOT_HERE = {
     "make page": "it loads packages from an index",
     "make test": "it is the suite that this test belongs to",
-    '.venv/bin/python -m pytest -q -m "not slow"': "it is the suite that this test belongs to",
+    '.venv/bin/python -m pytest -q -m "not slow and not long"': "the same",
     "make docs": "it loads packages from an index; tests/test_site.py builds the site",
     "python3 -m venv .venv": "the test brings an environment that is set up",
     ".venv/bin/pip install -e '.[dev]'": "it loads packages from an index",

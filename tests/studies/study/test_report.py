@@ -69,43 +69,51 @@ def folder(tmp_path):
     return write(tmp_path / "mine", rows())
 
 
-@pytest.fixture
-def results(folder):
-    return read_results(folder)
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    return read_results(write(tmp_path_factory.mktemp("report"), rows()))
 
 
-def table(results, measure, title, baseline=()):
-    section = next(
-        each for each in sections(results, results.baseline(baseline)) if each.measure == measure
-    )
+def said_of(results, baseline=()):
+    return sections(results, results.baseline(baseline))
+
+
+@pytest.fixture(scope="module")
+def said(results):
+    """What is said of these results; thousands of resamples, once."""
+    return said_of(results)
+
+
+def table(said, measure, title):
+    section = next(each for each in said if each.measure == measure)
     found = next(each for each in section.tables if each.title == title)
     return [dict(zip(found.columns, row, strict=True)) for row in found.rows]
 
 
-def test_a_factors_levels_have_their_averages_and_chances(results):
-    low, high = table(results, "greedy_mean", "alpha")
+def test_a_factors_levels_have_their_averages_and_chances(said):
+    low, high = table(said, "greedy_mean", "alpha")
     assert (low["runs"], low["IQM"], low["worst"]) == ("8", "215", "200")
     assert (high["IQM"], high["worst"]) == ("340", "300")
     # By hand: every run at 0.3 beats every run at 0.1.
     assert (high["P(better than 0.1)"], high["95 % of P"]) == ("1.00", "1.00 to 1.00")
     assert (low["P(better than 0.1)"], low["95 % of P"]) == ("", "")
-    (_, ties) = table(results, "greedy_mean", "ties")
+    (_, ties) = table(said, "greedy_mean", "ties")
     # By hand: 0.5 at alpha 0.1, where all is equal, and 1 at 0.3.
     assert ties["P(better than first)"] == "0.75"
 
 
-def test_points_of_a_level_are_tasks_on_a_full_grid(results):
+def test_points_of_a_level_are_tasks_on_a_full_grid(results, said):
     of = OfMeasure(results, "greedy_mean")
     scores = of.of_level(results.levels[0], 1)
     assert scores.T.tolist() == [[300, 310, 320, 330], [350, 360, 370, 380]]
     ends = bootstrap_interval(scores, resamples=2000)
-    assert table(results, "greedy_mean", "alpha")[1]["95 %"] == f"{ends.low:.5g} to {ends.high:.5g}"
+    assert table(said, "greedy_mean", "alpha")[1]["95 %"] == f"{ends.low:.5g} to {ends.high:.5g}"
     pooled = dataclasses.replace(results, study=dataclasses.replace(results.study, design="random"))
     assert OfMeasure(pooled, "greedy_mean").of_level(results.levels[0], 1).shape == (8,)
 
 
 def test_the_base_line_is_the_one_that_is_named(results):
-    low, high = table(results, "greedy_mean", "alpha", ["alpha=0.3"])
+    low, high = table(said_of(results, ["alpha=0.3"]), "greedy_mean", "alpha")
     assert (low["P(better than 0.3)"], high["P(better than 0.3)"]) == ("0.00", "")
     with pytest.raises(ConfigError, match=r"alpha: level '0.2' is unknown; available: 0.1, 0.3"):
         results.baseline(["alpha=0.2"])
@@ -113,8 +121,8 @@ def test_the_base_line_is_the_one_that_is_named(results):
         results.baseline(["alpa=1"])
 
 
-def test_a_run_that_was_never_solved_counts_as_all_that_it_spent(results):
-    low, high = table(results, "episodes_to_solve", "alpha")
+def test_a_run_that_was_never_solved_counts_as_all_that_it_spent(said):
+    low, high = table(said, "episodes_to_solve", "alpha")
     assert (low["worst"], high["worst"]) == ("100", "13")
     assert (low["solved"], high["solved"]) == ("75%", "100%")
     assert low["IQM"] == f"{iqm([10, 11, 12, 100] * 2):.5g}"
@@ -123,17 +131,17 @@ def test_a_run_that_was_never_solved_counts_as_all_that_it_spent(results):
         (x < y) + (x == y) / 2 for x, y in itertools.product([10, 11, 12, 13], [10, 11, 12, 100])
     )
     assert high["P(better than 0.1)"] == f"{wins / 16:.2f}"
-    notes = [t.note for s in sections(results, results.baseline(())) for t in s.tables]
+    notes = [t.note for s in said for t in s.tables]
     assert any("2 of 16 runs never came to it" in note for note in notes)
 
 
-def test_pairs_profiles_and_shares(results):
-    pair = table(results, "greedy_mean", "alpha and ties: IQM")
+def test_pairs_profiles_and_shares(said):
+    pair = table(said, "greedy_mean", "alpha and ties: IQM")
     assert pair[1]["random"].startswith("365 (")
-    profile = table(results, "greedy_mean", "alpha: performance profile")
+    profile = table(said, "greedy_mean", "alpha: performance profile")
     assert list(profile[0]) == ["alpha", *(f"more than {200 + 30 * n}" for n in range(1, 6))]
     assert [row["more than 320"] for row in profile] == ["0%", "62%"]
-    shares = {row["factor"]: row for row in table(results, "greedy_mean", "sensitivity")}
+    shares = {row["factor"]: row for row in table(said, "greedy_mean", "sensitivity")}
     total = np.concatenate(list(MEANS.values())).var()
     assert shares["alpha"]["share of variance"] == f"{62.5**2 / total:.1%}"
     assert shares["ties"]["share of variance"] == f"{12.5**2 / total:.1%}"
@@ -142,14 +150,14 @@ def test_pairs_profiles_and_shares(results):
     assert shares["alpha"]["by chance"] == f"{1 / 15:.1%}"
 
 
-def test_the_best_points_and_the_worst_runs_and_seeds(results):
-    best = table(results, "greedy_mean", "points")
+def test_the_best_points_and_the_worst_runs_and_seeds(said):
+    best = table(said, "greedy_mean", "points")
     assert [row["point"] for row in best[:2]] == ["alpha=0.3 ties=random", "alpha=0.3 ties=first"]
-    worst = table(results, "greedy_mean", "worst runs")
+    worst = table(said, "greedy_mean", "worst runs")
     assert (worst[0]["seed"], worst[0]["greedy_mean"]) == ("0", "200")
-    seeds = table(results, "episodes_to_solve", "worst seeds")
+    seeds = table(said, "episodes_to_solve", "worst seeds")
     assert [row["seed"] for row in seeds] == ["3", "2", "1", "0"]
-    (section, _) = sections(results, results.baseline(()))
+    (section, _) = said
     assert section.sentence.startswith("Best by greedy_mean is alpha=0.3 ties=random: IQM 365")
     assert "alpha explains most: 9" in section.sentence
 
@@ -160,7 +168,7 @@ def test_failed_runs_are_left_out_and_counted(tmp_path):
     assert (results.failed, len(results.seeds)) == (1, 15)
     # No full grid is left: all of a level are pooled.
     assert OfMeasure(results, "greedy_mean").of_level(results.levels[0], 0).shape == (7,)
-    assert sections(results, results.baseline(()))
+    assert said_of(results)
 
 
 def test_a_range_is_told_in_parts(tmp_path):
@@ -189,7 +197,7 @@ def test_what_only_three_factors_explain_is_not_left_to_seeds(tmp_path):
     shares = {
         row["factor"]: (row["share of variance"], row["by chance"])
         for row in table(
-            read_results(write(tmp_path / "mine", three_factors(), text)),
+            said_of(read_results(write(tmp_path / "mine", three_factors(), text))),
             "greedy_mean",
             "sensitivity",
         )
@@ -199,14 +207,14 @@ def test_what_only_three_factors_explain_is_not_left_to_seeds(tmp_path):
     assert shares["seeds and the rest"] == (f"{0.01 / 1.01:.1%}", "")
     assert shares["alpha and gamma"][0] == "0.0%"
     some = read_results(write(tmp_path / "mine", three_factors()[:-2], text))
-    names = [row["factor"] for row in table(some, "greedy_mean", "sensitivity")]
+    names = [row["factor"] for row in table(said_of(some), "greedy_mean", "sensitivity")]
     assert "more than two together" not in names
 
 
 def test_a_cell_of_a_pair_keeps_the_points_of_other_factors_apart(tmp_path):
     text = FILE + "gamma = [0.9, 1.0]\n"
     results = read_results(write(tmp_path / "mine", three_factors(), text))
-    cell = table(results, "greedy_mean", "alpha and ties: IQM")[0]["first"]
+    cell = table(said_of(results), "greedy_mean", "alpha and ties: IQM")[0]["first"]
     ends = bootstrap_interval(np.array([[0.9, -1.1], [1.1, -0.9]]), resamples=2000)
     assert cell == f"{iqm([-1.1, -0.9, 0.9, 1.1]):.4g} ({ends.low:.4g} to {ends.high:.4g})"
 
@@ -214,7 +222,7 @@ def test_a_cell_of_a_pair_keeps_the_points_of_other_factors_apart(tmp_path):
 def test_points_and_runs_that_are_alike_are_counted(tmp_path):
     alike = [{**row, "greedy_mean": 500.0, "episodes_to_solve": ""} for row in rows()]
     results = read_results(write(tmp_path / "mine", alike))
-    means, solved = sections(results, results.baseline(()))
+    means, solved = said_of(results)
     assert means.sentence == (
         "Best by greedy_mean is alpha=0.1 ties=first (and 3 of 4 points that are as good): IQM 500 "
         "(95 % 500 to 500, 4 runs); no factor explains more of the variance than chance would."
@@ -226,19 +234,20 @@ def test_points_and_runs_that_are_alike_are_counted(tmp_path):
 
 def test_a_single_run_has_no_interval(tmp_path):
     results = read_results(write(tmp_path / "mine", rows()[:1]))
-    assert table(results, "greedy_mean", "points")[0]["95 %"] == ""
-    assert list(table(results, "greedy_mean", "alpha: performance profile")[0]) == [
+    said = said_of(results)
+    assert table(said, "greedy_mean", "points")[0]["95 %"] == ""
+    assert list(table(said, "greedy_mean", "alpha: performance profile")[0]) == [
         "alpha",
         "more than 200",
     ]
-    (section, _) = sections(results, results.baseline(()))
+    (section, _) = said
     assert ": IQM 200 (1 run); no factor" in section.sentence
     assert results.left == 15
 
 
 def test_points_with_a_single_seed_are_pooled(tmp_path):
     results = read_results(write(tmp_path / "mine", rows()[::4]))
-    high = table(results, "greedy_mean", "alpha")[1]
+    high = table(said_of(results), "greedy_mean", "alpha")[1]
     assert (high["runs"], high["95 %"]) == ("2", "300 to 350")
 
 
@@ -274,8 +283,8 @@ def test_what_is_no_study_is_refused(tmp_path):
         read_results(tmp_path)
 
 
-def test_markdown_and_latex_have_every_table(results):
-    found = sections(results, results.baseline(()))
+def test_markdown_and_latex_have_every_table(said):
+    found = said
     text, tex = markdown("a|b", "head", found, "p.png"), latex("50% & more", found)
     count = sum(len(section.tables) for section in found)
     assert text.startswith("# a\\|b\n\nhead\n\n![](p.png)\n\n## greedy_mean\n")
