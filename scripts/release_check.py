@@ -1,7 +1,8 @@
 """A release, tried out before it is one: `make release-check`.
 
-Builds the source archive and the wheel, installs each in a fresh environment, does the three jobs
-there in an empty folder, and says what an index and a user would get: metadata, licences, sizes.
+Builds the source archive and the wheel, installs each in a fresh environment, trains, films, edits
+and writes a page there in an empty folder, and says what an index and a user would get: metadata,
+licences, sizes.
 """
 
 import os
@@ -19,9 +20,10 @@ JOBS = (
     "render runs/tuned-mujoco-seed0 -o film.gif --size 320x240 --fps 12.5",
     "model edit cartpole --set pole.length=1.5 -o mine.xml",
     "train --model mine.xml --run-dir runs/mine --no-video",
+    "page runs/tuned-mujoco-seed0 -o page.html",
 )
 TOOLS = ("build", "twine")
-MADE = ("runs/tuned-mujoco-seed0/policy.json", "film.gif", "runs/mine/policy.json")
+MADE = ("runs/tuned-mujoco-seed0/policy.json", "film.gif", "runs/mine/policy.json", "page.html")
 LICENCES = """
 from importlib.metadata import distributions
 for one in distributions():
@@ -66,7 +68,7 @@ def megabytes(path: Path) -> str:
 
 
 def tried(archive: Path, place: Path) -> Iterator[tuple[str, str]]:
-    """Install an archive, do the three jobs, and yield what there is to say of it."""
+    """Install an archive, do the jobs, and yield what there is to say of it."""
     programs, empty = environment(place / "venv", archive), place / "empty"
     empty.mkdir()
     for job in JOBS:

@@ -20,7 +20,7 @@ def script():
 
 def test_its_jobs_are_understood(script):
     found = [name_of(type(parse(shlex.split(job)))) for job in script["JOBS"]]
-    assert found == ["train", "render", "model", "train"]
+    assert found == ["train", "render", "model", "train", "page"]
 
 
 def test_a_command_that_fails_is_told_in_one_line(script):
