@@ -37,12 +37,15 @@ def bits(*values):
     return struct.pack(f"{len(values)}d", *values)
 
 
+ending_index, row_of = numba.njit(kernels._ending_index), numba.njit(kernels._row_of)
+
+
 @pytest.mark.parametrize("terminated", [True, False])
 @pytest.mark.parametrize("x", [0.0, 2.4, -2.4, 2.5, -2.5, math.nan])
 def test_endings_are_those_of_the_rules(terminated, x):
     for limit in (2.4, 1.0, math.inf):
         expected = episodes.ending_index(terminated, x, limit)
-        assert kernels._ending_index(terminated, x, limit) == expected
+        assert ending_index(terminated, x, limit) == expected
 
 
 @given(
@@ -59,7 +62,7 @@ def test_rows_are_the_discretizers(bins, low, width, values):
     edges = [(low[axis], high[axis], math.nextafter(high[axis], -9)) for axis in range(4)]
     for point in (values, *zip(*edges, strict=True)):
         expected = discretizer.row_of(point, grid.grid)
-        assert kernels._row_of(tuple(point), arrays) == expected < grid.n_states
+        assert row_of(tuple(point), arrays) == expected < grid.n_states
 
 
 rates = st.sampled_from([0.0, 0.1, 1.0]) | st.floats(0, 1)

@@ -8,15 +8,14 @@ numbers are those of `stepping.advance`, which everything else waits for.
 from typing import Any
 
 import numpy as np
-from numba.extending import register_jitable
 
 from mjcartpole.learning.kinds import Rules, State
-from mjcartpole.learning.linking import AnyPhysics, for_each
+from mjcartpole.learning.linking import AnyPhysics, compiled, for_each
 from mjcartpole.learning.stepping import advance
 from mjcartpole.physics.cartpole_v1 import cartpole_v1_moved
 
 
-@register_jitable
+@compiled
 def _both_next(physics: AnyPhysics, state: State, sin: float, cos: float) -> Any:
     x, x_dot, theta, theta_dot = state
     left = cartpole_v1_moved(x, x_dot, theta, theta_dot, physics.left, sin, cos)

@@ -21,7 +21,6 @@ import numpy.typing as npt
 from numba import types
 from numba.core.caching import FunctionCache
 from numba.core.runtime.nrt import rtsys
-from numba.extending import register_jitable
 
 from mjcartpole import rewards, task
 from mjcartpole.disturbances import effects
@@ -177,7 +176,7 @@ class _Kept(FunctionCache):
 
 def _entry(function: F, sources: str) -> F:
     """Compile what Python calls, and keep it on disk, where a folder for that can be written."""
-    entry: Any = compiled(function)
+    entry: Any = _for_python(function)
     if sources:
         with contextlib.suppress(RuntimeError):
             entry._cache = _Kept(function)  # type: ignore[no-untyped-call]
@@ -188,7 +187,11 @@ def _entry(function: F, sources: str) -> F:
 def uncached(entry: Callable[..., int]) -> Callable[..., int]:
     """Return an entry of its own for a process in which the cache on disk cannot be used."""
     function: Callable[..., int] = cast(Any, entry).py_func
-    return compiled(function)
+    return _for_python(function)
+
+
+def _for_python(function: F) -> F:
+    return cast(F, numba.njit(error_model="numpy", nogil=True)(function))
 
 
 @functools.cache
@@ -296,7 +299,7 @@ def _compilable(function: Any) -> Any:
     """Let compiled code call a plain function, and the plain functions that this one calls."""
     for each in _reached(function) - _known:
         _known.add(each)
-        register_jitable(each)
+        compiled(each)
     return function
 
 
@@ -327,7 +330,7 @@ def why_not_compilable(reward: Reward) -> str:
         return ""
     if not isinstance(reward, FunctionType):
         return "is no plain function"
-    trial: Any = compiled(_compilable(reward))
+    trial: Any = _for_python(_compilable(reward))
     try:
         trial.compile((numba.float64,) * 4 + (numba.boolean,))
     except Exception as error:  # Numba has more kinds than it documents.

@@ -2,17 +2,21 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, TypeAlias, TypeVar, cast
+from typing import Any, Final, TypeAlias, TypeVar, cast
 
 import llvmlite.binding
-import numba
 from numba import types
-from numba.extending import intrinsic, overload
+from numba.extending import intrinsic, overload, register_jitable
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 AnyPhysics: TypeAlias = Any
 """One kind of physics, where Numba is to see one name for all."""
+
+
+INSIDE: Final[Any] = {"error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+"""Options of functions that only compiled code calls: no way from Python into each is compiled, and
+Numba takes what it has for one caller for all, where their options are the same."""
 
 
 def link(library: Path | None) -> str:
@@ -29,9 +33,8 @@ def link(library: Path | None) -> str:
 
 
 def compiled(function: F) -> F:
-    """Compile a function when it is first called, for others here to call."""
-    jitted: Any = numba.njit(error_model="numpy", nogil=True)(function)
-    return cast(F, jitted)
+    """Let compiled code call a function; for Python it stays what it is."""
+    return register_jitable(**INSIDE)(function)
 
 
 def _array_at(kind: types.Type) -> Callable[[int], Any]:
@@ -63,7 +66,7 @@ def for_each(mujoco: F, gym: F, **others: Callable[..., Any]) -> Callable[[F], F
     functions: dict[str, Any] = {"MujocoPhysics": mujoco, **others}
 
     def register(stub: F) -> F:
-        @overload(stub, strict=False)
+        @overload(stub, strict=False, jit_options=INSIDE)
         def choose(physics: AnyPhysics, *others: object) -> Any:
             return functions.get(physics.instance_class.__name__, gym)
 

@@ -14,25 +14,25 @@ from typing import Any
 import numba
 import numpy as np
 from numba import types
-from numba.extending import overload, register_jitable
+from numba.extending import overload
 
 from mjcartpole import task
 from mjcartpole.disturbances import effects as effects_of
 from mjcartpole.learning import fitted
 from mjcartpole.learning.kinds import Floats, Rules, State
-from mjcartpole.learning.linking import AnyPhysics, compiled, floats, for_each, ints
+from mjcartpole.learning.linking import INSIDE, AnyPhysics, compiled, floats, for_each, ints
 from mjcartpole.physics import cartpole_v1
 from mjcartpole.physics.simulation import FARTHEST_SANE, LARGEST_SANE
 from mjcartpole.rewards import Reward
 
 _max_abs, _wrapped = compiled(task.max_abs), compiled(task.wrapped)
 _carray = numba.carray  # type: ignore[attr-defined]
-register_jitable(cartpole_v1.cartpole_v1_moved)
+compiled(cartpole_v1.cartpole_v1_moved)
 _cartpole_v1_step = compiled(cartpole_v1.cartpole_v1_step)
 
 _control_of = compiled(task.control_of)
-for _each in (effects_of._remember, effects_of._shoved, task.wrapped):
-    register_jitable(_each)
+for _each in (effects_of._remember, effects_of._shoved):
+    compiled(_each)
 _actuate, _sense = compiled(effects_of.actuate), compiled(effects_of.sense)
 _forget = compiled(effects_of.forget)
 
@@ -103,7 +103,7 @@ def start_at(physics: AnyPhysics, rules: Rules, starts: Any, number: int) -> Sta
     raise NotImplementedError
 
 
-@overload(start_at, strict=False)
+@overload(start_at, strict=False, jit_options=INSIDE)
 def _choose_start(physics: AnyPhysics, rules: Any, starts: Any, number: Any) -> Any:
     def drawn(physics: AnyPhysics, rules: Rules, starts: Any, number: int) -> State:
         return begin(physics, rules, starts)
@@ -141,8 +141,8 @@ def _advance_gym(physics: AnyPhysics, rules: Rules, state: State, action: int) -
     return _cartpole_v1_step(state[0], state[1], state[2], state[3], force)
 
 
-register_jitable(fitted.bounded)
-register_jitable(fitted.dot)
+compiled(fitted.bounded)
+compiled(fitted.dot)
 _rod_step, _linear_step = compiled(fitted.rod_step), compiled(fitted.linear_step)
 
 
