@@ -218,6 +218,7 @@ def test_help_tells_of_the_version(capsys):
     assert "--version" in call(["--help"], capsys)[1]
 
 
+@pytest.mark.long
 def test_a_run_at_the_files_own_timestep_is_evaluated_as_it_was_trained(here, capsys):
     odd = load_model().xml.replace('timestep="0.02"', 'timestep="0.015"')
     (here / "odd.xml").write_text(odd)
@@ -238,6 +239,7 @@ def test_a_run_at_the_files_own_timestep_is_evaluated_as_it_was_trained(here, ca
     assert (code, "asked for" in error) == (2, True)
 
 
+@pytest.mark.long
 def test_it_is_said_where_no_policy_can_balance_a_model(here, capsys):
     train = ["train", "--engine", "python", "--episodes", "3", "--no-video", "--no-curve"]
     words = "no policy can balance this: from 8 of 8 starts every sequence of actions ends"

@@ -44,6 +44,7 @@ def test_many_seeds_are_evaluated_elsewhere(seeds, capsys):
     assert re.search(rf"^ +1 +{mean} ", out, re.M)
 
 
+@pytest.mark.long
 def test_a_seed_without_a_policy_is_named_and_left_out(seeds, capsys):
     (seeds / "seed-1" / "policy.json").unlink()
     for command in (["evaluate"], ["transfer", "--models", "gym", "--episodes", "2"]):
@@ -75,6 +76,7 @@ def test_the_median_of_many_seeds_is_filmed(seeds, capsys):
     assert f"videos/many-seed-{median}.mp4" in call(command, capsys)[1]
 
 
+@pytest.mark.long
 def test_many_seeds_are_one_column_of_a_transfer(seeds, capsys):
     command = ["transfer", "runs/many", "runs/many/seed-2", "--episodes", "4"]
     code, out, err = call([*command, "--models", "gym,cartpole"], capsys)

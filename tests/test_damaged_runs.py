@@ -225,6 +225,7 @@ def damage_bytes(path, rng):
     return start, end
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", [0, *(pytest.param(n, marks=pytest.mark.slow) for n in range(9))])
 @pytest.mark.parametrize("damage", few([damage_value, damage_bytes], damage_bytes))
 def test_damaged_values_and_bytes_are_one_line(damage, seed, place, capsys):

@@ -58,6 +58,7 @@ def test_a_table_of_known_figures():
     assert deep == "| PPO | gym | 4 of 4 | 9 | 100 | 40 | 472 (470 to 473) | 480 |"
 
 
+@pytest.mark.long
 def test_the_table_on_the_page_is_that_of_the_file_beside_it(call):
     printed = call("table", ROOT / "docs" / "deep.jsonl")
     assert len(printed.splitlines()) > 10

@@ -323,6 +323,7 @@ def reads(checkout, tmp_path_factory):
     return lambda page: Reader(copy_of(checkout if page == "README.md" else after_make_train()))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("page", few(FAST, "README.md"))
 def test_a_page_in_short(page, reads):
     reads(page).follows(page, only=FAST[page])
@@ -352,6 +353,7 @@ def test_every_name_in_the_tables_is_on_a_page():
         assert any(re.search(pattern, text) for text in texts), pattern
 
 
+@pytest.mark.long
 def test_every_command_is_understood():
     lines = {block.text for page in PAGES for block in blocks(page) if block.kind == "command"}
     ours = [line for line in lines if line.startswith(("mjcartpole ", ".venv/bin/mjcartpole "))]

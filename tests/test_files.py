@@ -98,6 +98,7 @@ while True:
 """
 
 
+@pytest.mark.long
 def test_a_kill_leaves_the_old_file_or_the_new_one(tmp_path):
     path = tmp_path / "file.txt"
     write_whole(path, "0" * 200_000)

@@ -46,6 +46,7 @@ def names(folder):
     return sorted(path.name for path in folder.iterdir())
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", few(["k.mp4", "k.gif", "k", "concat:k.mp4"], "k.mp4"))
 def test_what_a_killed_film_leaves_goes_with_the_next_one_and_a_living_one_stays(name, tmp_path):
     killed, living = start_filming(tmp_path / name), start_filming(tmp_path / "living.gif")

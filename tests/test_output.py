@@ -37,6 +37,7 @@ def assert_complete(run):
     assert not list(run.glob("checkpoint*"))
 
 
+@pytest.mark.long
 @on_unix
 @pytest.mark.parametrize(
     "where",
@@ -104,6 +105,7 @@ def test_a_watch_whose_reader_has_left_ends(tmp_path):
     assert (code, out.count("\n"), err) == (0, 1, "")
 
 
+@pytest.mark.long
 @on_unix
 @pytest.mark.parametrize("encoding", ["ascii", pytest.param("cp1252", marks=pytest.mark.slow)])
 @pytest.mark.parametrize(

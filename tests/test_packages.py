@@ -122,6 +122,7 @@ def three(tmp_path_factory):
     return run
 
 
+@pytest.mark.long
 def test_three_packages_are_enough_for_environments_edits_and_training(three):
     code, out, err = three("-c", textwrap.dedent(WORKS))
     assert (code, err) == (

@@ -292,6 +292,7 @@ def call(argv):
     return stop.value.code
 
 
+@pytest.mark.long
 def test_a_run_is_stored_continued_evaluated_and_filmed(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     flags = ["--model", CHAIN, "--episodes", "30", "--no-video", "--no-curve"]

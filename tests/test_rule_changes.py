@@ -17,6 +17,7 @@ from mjcartpole.rule_changes import RuleChanges
 from mjcartpole.studies.eval_target import EvalTarget
 from mjcartpole.studies.policy_setup import controller_setup, find_setup
 from mjcartpole.task import CARTPOLE_V1, SWING_UP, Task
+from nightly import few
 
 CHANGES = {
     "x_limit": 0.6,
@@ -47,7 +48,7 @@ def test_nothing_changed_is_the_task_itself():
     assert TrainConfig().rules is CARTPOLE_V1
 
 
-@pytest.mark.parametrize("backend", ["mujoco", "gym"])
+@pytest.mark.parametrize("backend", few(["mujoco", "gym"], "gym", long=("mujoco",)))
 def test_both_engines_learn_and_play_by_them_alike(backend):
     config = TrainConfig(backend=backend, episodes=25, **CHANGES)
     assert config.rules == RULES

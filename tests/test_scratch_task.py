@@ -151,6 +151,7 @@ def run(*words: str) -> int:
     return ended.value.code
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("backend", few(BACKENDS, "mujoco"))
 def test_the_command_line_trains_films_and_evaluates_it(backend, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)

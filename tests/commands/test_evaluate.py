@@ -46,6 +46,7 @@ def test_a_run_is_played_as_it_was_trained_but_for_what_is_given(run, flags, add
     assert (added or "") in out
 
 
+@pytest.mark.long
 def test_the_summary_names_them_and_an_evaluation_gives_the_same_again(run, capsys):
     summary = json.loads((run / "summary.json").read_text())["evaluation"]
     _, out, _ = call(["evaluate", run, "--json"], capsys)
@@ -77,6 +78,7 @@ def test_a_controller_is_disturbed_too(capsys):
     assert "pole fell         3" in out
 
 
+@pytest.mark.long
 def test_a_film_says_what_was_added(run, tmp_path, capsys):
     words = ["render", run, "--quality", "draft", "--size", "64x48", "--no-overlay", "--sheet"]
     _, out, _ = call([*words, "-o", tmp_path / "a.png"], capsys)

@@ -80,6 +80,7 @@ def test_the_command_prints_figures_and_writes_them_all(tmp_path, capsys):
             assert figure["name"] in out
 
 
+@pytest.mark.long
 def test_the_command_fails_with_1_and_says_why(tmp_path, capsys):
     path = tmp_path / "wrong.xml"
     path.write_text(changed(*WRONG["gravity"][0]))

@@ -11,6 +11,7 @@ from PIL import Image
 from command_line import done
 from mjcartpole import cli
 from mjcartpole.learning import compiled
+from nightly import few
 
 pytest.importorskip("matplotlib")
 TRAIN = ["train", "--backend", "gym", "--episodes", "8", "--no-video"]
@@ -65,7 +66,10 @@ def test_train_leaves_none_if_told_so_or_without_matplotlib(here, capsys, monkey
     )
 
 
-@pytest.mark.parametrize("kind", ["curve", "table", "basin", "phase", "endings"])
+KINDS = ["curve", "table", "basin", "phase", "endings"]
+
+
+@pytest.mark.parametrize("kind", few(KINDS, "curve", "table", "phase", "endings", long=("basin",)))
 def test_a_plot_and_its_data(kind, here, capsys):
     more = ["--points", "4"] if kind == "basin" else []
     name = "many" if kind in {"table", "endings"} else "one"
@@ -79,6 +83,7 @@ def test_a_plot_and_its_data(kind, here, capsys):
     assert ("run" if kind in {"curve", "endings"} else "what") in rows[0]
 
 
+@pytest.mark.long
 def test_nothing_is_replaced_unless_it_is_asked_for(here, capsys):
     assert "plots/one-and-1-others-curve.png" in call(["plot", "curve", "one", "many"], capsys)[1]
     for expected in ("plots/one-curve.png", "plots/one-curve-2.png"):

@@ -32,6 +32,7 @@ def test_a_controller_is_filmed(tmp_path, capsys):
     assert (tmp_path / "film.png").stat().st_size > 1_000
 
 
+@pytest.mark.long
 def test_controllers_are_carried_to_other_models(tmp_path, capsys):
     words = ["transfer", "--policy", "lqr", "random", "--models", "cartpole", "long", "gym"]
     assert run(*words, "--episodes", "5", "-o", "out") == 0

@@ -111,6 +111,7 @@ def test_every_format_opens_elsewhere(runs, name, capsys):
     assert not np.array_equal(frames[0], frames[-1])
 
 
+@pytest.mark.long
 def test_slow_motion_has_four_times_the_frames(runs, capsys):
     render([runs / "mujoco", "-o", "out.mp4", "--speed", "0.25"], capsys)
     frames, fps = mp4("out.mp4")
@@ -125,6 +126,7 @@ def test_several_episodes_follow_each_other(runs, capsys):
     assert len(mp4("out.mp4")[0]) == sum(steps) + 3
 
 
+@pytest.mark.long
 def test_a_seed_decides_where_it_starts(runs, capsys):
     for name, seed in (("a", 1), ("b", 1), ("c", 2)):
         render([runs / "mujoco", "-o", f"{name}.webp", "--seed", seed], capsys)
@@ -133,6 +135,7 @@ def test_a_seed_decides_where_it_starts(runs, capsys):
     assert not np.array_equal(first["a"], first["c"])
 
 
+@pytest.mark.long
 def test_a_camera_follows_the_cart(runs, capsys):
     for camera in ("side", "follow"):
         render([runs / "mujoco", "-o", f"{camera}.webp", "--camera", camera], capsys)
@@ -176,6 +179,7 @@ def test_a_run_can_be_filmed_elsewhere(runs, here, capsys):
     assert len(mp4("gym.mp4")[0]) == steps_of(runs / "mujoco", backend="gym")[0] + 1
 
 
+@pytest.mark.long
 def test_a_policy_file_alone_is_enough(runs, capsys):
     assert "videos/mujoco.mp4" in render([runs / "mujoco" / "policy.json"], capsys)
     copy = shutil.copy(runs / "mujoco" / "policy.json", runs / "mine.json")
@@ -221,6 +225,7 @@ def test_an_odd_size_is_cut_and_said_so(runs, capsys):
     assert mp4("out.mp4")[0][0].shape == (120, 160, 3)
 
 
+@pytest.mark.long
 def test_a_pictures_odd_size_stays(runs, capsys):
     code, out, err = call(["render", runs / "mujoco", "-o", "p", "--size", "161x121"], capsys)
     assert (code, err) == (0, "")
@@ -229,6 +234,7 @@ def test_a_pictures_odd_size_stays(runs, capsys):
         assert image.size == (161, 121)
 
 
+@pytest.mark.long
 def test_a_film_is_never_replaced_unasked(runs, capsys):
     first = render([runs / "mujoco"], capsys)
     again = render([runs / "mujoco", "--backend", "gym"], capsys)
@@ -372,6 +378,7 @@ def test_an_interrupted_mp4_leaves_the_old_one(runs, here, number, code):
     assert [path.read_bytes() for path in (here / "out").iterdir()] == [b"old"]
 
 
+@pytest.mark.long
 @pytest.mark.skipif(os.name == "nt", reason="needs a terminal that a program can read")
 def test_on_a_terminal_there_is_a_progress_bar_that_goes_away(runs, here):
     import pty

@@ -183,6 +183,7 @@ def test_a_run_that_fails_is_told_and_takes_no_other_down(tmp_path, monkeypatch,
     assert "2 runs done before, 0 left" in out
 
 
+@pytest.mark.long
 def test_the_example_of_the_docs(tmp_path, monkeypatch, capsys):
     docs = Path(__file__).parents[2] / "docs"
     text = (docs / "study.toml").read_text()

@@ -20,6 +20,7 @@ from mjcartpole.learning.training import train
 from trainings import FILM, NINE, SHORT, SLOW, contents, names, wait_until
 
 
+@pytest.mark.long
 def test_events_are_replaced_with_the_run_they_belong_to(here, capsys):
     pytest.importorskip("tensorboardX")
     assert call([*SHORT, "--tensorboard", "--run-dir", "run"], capsys)[0] == 0
@@ -77,6 +78,7 @@ def test_a_complete_run_names_the_unfinished_one_beside_it(here, capsys):
     assert f"this goes to {first}-3{hint}\n" in call(NINE, capsys)[1]
 
 
+@pytest.mark.long
 def test_a_hint_names_the_folder_as_a_shell_takes_it(here, fork, capsys):
     child = fork([*SLOW, "--run-dir", "my run", "--checkpoint-every", "0"])
     wait_until((here / "my run" / LATEST).exists, child)
@@ -87,6 +89,7 @@ def test_a_hint_names_the_folder_as_a_shell_takes_it(here, fork, capsys):
     assert call(hint, capsys)[0] == 0
 
 
+@pytest.mark.long
 def test_a_header_says_what_was_changed(here, capsys):
     flags = ["--set", "pole.length=1.5,pole.mass=0.2", "--bins", "1,3,6,9", "--model", "cartpole"]
     out = call([*SHORT, *flags], capsys)[1]

@@ -19,6 +19,7 @@ def limit_files(size):
     return lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
 
 
+@pytest.mark.long
 def test_a_full_disk_is_one_line_and_the_last_good_checkpoint_goes_on(
     here, fork, slow_reference, capsys
 ):
@@ -62,6 +63,7 @@ def test_a_disk_that_is_full_at_once_leaves_nothing(here, fork):
     assert not Path("run").exists()
 
 
+@pytest.mark.long
 def test_a_disk_that_is_full_for_the_events_is_one_line(here, fork, capsys):
     pytest.importorskip("tensorboardX")
     command = [
@@ -101,6 +103,7 @@ def mounts(tmp_path_factory):
 RESUME, REPLACE = "--resume run", "--no-video --no-curve --overwrite --run-dir run"
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("mounts")
 @pytest.mark.parametrize("flags", few([RESUME, REPLACE], RESUME))
 def test_a_read_only_disk_is_one_line(flags, killed):

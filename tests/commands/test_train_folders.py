@@ -38,6 +38,7 @@ def test_a_resumed_training_holds_its_folder_too(killed, fork, capsys):
     assert "is in use by another training" in err
 
 
+@pytest.mark.long
 def test_a_folder_of_seeds_has_one_training_while_it_lives(here, fork, capsys):
     seeds = ["train", "--backend", "gym", "--episodes", "400000", "--no-curve", "--seeds", "2"]
     child = fork([*seeds, "--preset", "article-terminal", "--run-dir", "many"])
@@ -88,6 +89,7 @@ def test_a_model_of_ones_own_is_never_replaced(here, capsys):
         assert Path("mine/model.xml").read_text() == "my own model"
 
 
+@pytest.mark.long
 def test_one_seed_and_many_do_not_share_a_folder(here, capsys):
     assert call([*SHORT, "--run-dir", "one"], capsys)[0] == 0
     assert (

@@ -44,6 +44,7 @@ def test_a_run_that_is_killed_again_and_again_ends_as_if_it_was_not(
     assert_equal_runs("run", slow_reference)
 
 
+@pytest.mark.long
 def test_a_training_that_is_killed_goes_on_in_the_same_dream(here, fork, capsys):
     command = [*SLOW, "--method", "identify", "--fit-steps", "20", "--noise", "0.001"]
     child = fork([*command, "--run-dir", "run", "--checkpoint-every", "0"])
@@ -71,6 +72,7 @@ def tree(folder):
     }
 
 
+@pytest.mark.long
 @EACH
 @pytest.mark.parametrize("overwrite", [False, pytest.param(True, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("kind", few(BEGINNINGS, "one"))

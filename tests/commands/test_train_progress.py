@@ -44,6 +44,7 @@ def test_a_training_that_is_solved_is_complete(here, capsys):
     assert "greedy evaluation" in call(["evaluate", "run", "--episodes", "2"], capsys)[1]
 
 
+@pytest.mark.long
 def test_seeds_say_within_how_many_episodes_they_were_solved(here, capsys):
     command = [
         "train",

@@ -85,6 +85,7 @@ def test_the_python_engine_in_processes_gives_the_same(alone):
     assert_equal_seeds("many")
 
 
+@pytest.mark.long
 @EACH
 def test_seeds_that_are_killed_at_changes_of_the_file_system(stride, alone, fork, capsys):
     rng = random.Random(stride)
@@ -143,6 +144,7 @@ def processes_here():
     return found
 
 
+@pytest.mark.long
 @needs_proc
 @pytest.mark.parametrize("number", few([signal.SIGKILL, signal.SIGTERM], signal.SIGKILL))
 def test_the_workers_of_a_training_that_is_gone_go_as_well(number, here, capsys):
@@ -173,6 +175,7 @@ def wild(here):
     return ["train", "--model", "wild.xml", "--bins", *"1111", "--episodes", "8", *greedy]
 
 
+@pytest.mark.long
 def test_a_failing_seed_does_not_take_the_others_down(wild, capsys):
     arguments = [*wild, "--seed", "3", "--seeds", "3", "--run-dir", "many"]
     code, out, err = call(arguments, capsys)
@@ -195,6 +198,7 @@ def test_a_failing_seed_does_not_take_the_others_down(wild, capsys):
     assert figures["greedy_return"]["count"] == 1
 
 
+@pytest.mark.long
 def test_a_seed_that_is_blocked_is_named_and_goes_on_once_it_is_free(alone, capsys):
     assert call([*FEW, "--seeds", "3", "--run-dir", "many"], capsys)[0] == 0
     shutil.rmtree("many/seed-4")
@@ -210,6 +214,7 @@ def test_a_seed_that_is_blocked_is_named_and_goes_on_once_it_is_free(alone, caps
     assert_equal_seeds("many")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "events", [[], pytest.param(["--tensorboard"], marks=pytest.mark.slow)], ids=["plain", "events"]
 )

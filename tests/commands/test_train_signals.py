@@ -16,6 +16,7 @@ from nightly import few
 from trainings import SAME, SLOW, assert_equal_runs, contents, names, wait_until
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("engine", few(["compiled", "python"], "compiled"))
 @pytest.mark.parametrize(
     ("number", "code"),

@@ -109,6 +109,7 @@ def test_a_run_is_swept_on_its_own_model(policies, tmp_path, trained):
     assert document["points"][0]["policy"] == "mine"
 
 
+@pytest.mark.long
 def test_disturbances_are_taken_and_swept(policies, tmp_path, capsys):
     models = ["cartpole", "gym"]
     Transfer(policies[:1], models=models, delay=2, noise=(0.01,), episodes=2, output=tmp_path).run()
@@ -173,6 +174,7 @@ def test_mistakes_in_the_sources(tmp_path, policies):
         Transfer(policies[:1], models=["cartpole"], output=tmp_path / "taken").run()
 
 
+@pytest.mark.long
 def test_a_table_is_never_replaced_unasked(policies, tmp_path, capsys):
     for _ in range(2):
         Transfer(policies[:1], models=["gym"], episodes=2).run()
@@ -224,6 +226,7 @@ def narrow():
     del TASKS[task.name]
 
 
+@pytest.mark.long
 def test_the_rules_are_the_policies_own_unless_others_are_asked_for(policies, tmp_path, narrow):
     def returns(sources, **options):
         Transfer(

@@ -84,6 +84,7 @@ def test_rendering_without_a_mode_warns():
     envs.close()
 
 
+@pytest.mark.long
 def test_no_opengl_is_needed_whatever_the_environment_asks_for():
     code = (
         "import gymnasium, mjcartpole\n"

@@ -1,4 +1,4 @@
-"""Which of many alike run in the fast set, and which at night only."""
+"""Which of many alike run in the fast set, which take a while, and which run at night only."""
 
 import os
 
@@ -27,11 +27,12 @@ def characters(*, control=True):
     return at_night(every, fast=st.sampled_from(some))
 
 
-def few(cases, *fast):
-    """Return cases for parametrize: some are fast, the others run at night."""
-    return [case if case in fast else _nightly(case) for case in cases]
+def few(cases, *fast, long=()):
+    """Return cases for parametrize: some are fast, some take a while, the others run at night."""
+    others = ((case, pytest.mark.long if case in long else pytest.mark.slow) for case in cases)
+    return [case if case in fast else _marked(case, mark) for case, mark in others]
 
 
-def _nightly(case):
+def _marked(case, mark):
     values = case if isinstance(case, tuple) else (case,)
-    return pytest.param(*values, marks=pytest.mark.slow)
+    return pytest.param(*values, marks=mark)

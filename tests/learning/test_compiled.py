@@ -81,6 +81,7 @@ CRAMPED = """
 """
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("engine", few(ENGINES, "compiled"))
 def test_an_error_inside_mujoco_does_not_end_the_process(engine, tmp_path, monkeypatch):
     """MuJoCo's answer to too little memory for contacts is `exit`, unless somebody steps in."""

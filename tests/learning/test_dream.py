@@ -11,6 +11,7 @@ from mjcartpole.learning.dream import Dream, look
 from mjcartpole.learning.fitted import Linear, Rod
 from mjcartpole.rewards import minus_one_at_the_end
 from mjcartpole.task import CARTPOLE_V1, SWING_UP
+from nightly import at_night
 
 REFERENCE = Rod(10 / 1.1, 0.05 / 1.1, 14.7, 1.5, 0.0, 0.02)
 
@@ -56,7 +57,7 @@ def test_random_actions_are_as_often_one_as_the_other():
 def test_a_dream_of_the_world_as_it_is_is_the_world(rules):
     world, dream = make_env("gym", task=rules), Dream(REFERENCE, rules)
     rng = np.random.default_rng(1)
-    for number in range(20):
+    for number in range(at_night(20, fast=4)):
         seed = 3 if number == 0 else None
         begun = [env.reset(seed=seed)[0] for env in (world, dream)]
         assert begun[0].tolist() == begun[1].tolist()

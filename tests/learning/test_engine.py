@@ -85,6 +85,7 @@ def test_the_compiled_engine_runs_where_it_can(caplog):
     assert not caplog.records
 
 
+@pytest.mark.long
 def test_what_was_compiled_before_is_loaded_without_what_compiling_needs():
     config = TrainConfig(backend="gym", episodes=1)
     train(config)
@@ -122,6 +123,7 @@ def test_where_numba_compiles_nothing_the_reference_loop_does_the_same():
     assert said.count("\n") == 1
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("package", "error", "reason"),
     [

@@ -47,6 +47,7 @@ def hold(folder):
     return True
 
 
+@pytest.mark.long
 def test_racing_trainings_hold_a_folder_one_after_the_other(tmp_path):
     counts = race(tmp_path / "deep" / "run", hold, rounds=at_night(300, fast=60))
     assert min(counts) >= 0

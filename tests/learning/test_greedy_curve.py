@@ -37,7 +37,11 @@ EACH = list(itertools.product(METHODS, ["gym", "mujoco"], ENGINES))
 
 @pytest.mark.parametrize(
     ("method", "backend", "engine"),
-    few(EACH, ("q-learning", "gym", "python"), ("q-learning", "mujoco", "compiled")),
+    few(
+        EACH,
+        ("q-learning", "mujoco", "compiled"),
+        long=[("q-learning", "gym", "python")],
+    ),
 )
 def test_evaluations_change_no_bit_of_what_is_learned(method, backend, engine, monkeypatch):
     monkeypatch.setattr(compiled, "CHUNK_STEPS", 100)
@@ -46,6 +50,7 @@ def test_evaluations_change_no_bit_of_what_is_learned(method, backend, engine, m
     assert outcome(evaluated, engine) == outcome(config, engine)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("backend", few(["gym", "mujoco"], "gym"))
 def test_each_point_is_the_policy_of_that_moment_played_from_starts_of_its_own(backend):
     config = TrainConfig(backend=backend, episodes=20, evaluate_every=6)

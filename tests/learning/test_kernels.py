@@ -106,6 +106,7 @@ def both(name):
 FEW = ("n-step-sarsa", "actor-critic")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", few(METHODS, *FEW))
 @given(tables, rates, rates, rates, rates, rows, st.booleans(), st.booleans(), st.booleans())
 @quick
@@ -131,6 +132,7 @@ def test_every_method_learns_the_same_compiled(
     assert found[0] == found[1]
 
 
+@pytest.mark.long
 @given(rates, rates, st.floats(0, 2000), st.integers(0, 3000))
 @quick
 def test_schedules_are_the_same_line(start, end, length, number):

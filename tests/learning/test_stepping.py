@@ -112,6 +112,7 @@ def test_a_state_has_diverged_where_check_sane_says_so(state):
         assert not has_diverged(state)
 
 
+@pytest.mark.long
 @given(st.integers(0, 2**63))
 @quick
 def test_starting_states_of_several_poles_are_those_of_uniform(seed):
@@ -122,6 +123,7 @@ def test_starting_states_of_several_poles_are_those_of_uniform(seed):
     assert start == (*expected[:2], np.abs(expected[2::2]).max(), np.abs(expected[3::2]).max())
 
 
+@pytest.mark.long
 @given(st.lists(st.floats(-3.0, 3.0), min_size=6, max_size=6))
 @quick
 def test_several_poles_are_observed_as_they_are(state):

@@ -126,6 +126,7 @@ def content(snapshot):
     )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "changes",
     [

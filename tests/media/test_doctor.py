@@ -64,6 +64,7 @@ def test_it_names_versions_and_the_driver():
     json.dumps(report.as_dict())
 
 
+@pytest.mark.long
 @LINUX
 @pytest.mark.parametrize(
     ("there", "hidden"),
@@ -79,6 +80,7 @@ def test_only_one_backend(hide, there, hidden):
     assert report["opengl"] == [], "the doctor's own process touches OpenGL"
 
 
+@pytest.mark.long
 @LINUX
 def test_no_opengl_at_all(hide):
     report = examine_with(**hide("egl", "osmesa", "opengl", "x11"))

@@ -31,6 +31,7 @@ def test_rows_are_what_is_drawn():
     assert [bar.get_height() for bar in greedy.patches] == [0.5, 0.5]
 
 
+@pytest.mark.long
 def test_an_ending_looks_the_same_in_every_plot_and_differs_in_grey_or_by_its_hatch(tmp_path):
     figure = plot(3).figure()
     assert [text.get_text() for text in figure.legends[0].get_texts()] == [

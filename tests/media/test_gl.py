@@ -177,6 +177,7 @@ def backend(request):
     return request.param
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("other", few(["egl", "osmesa"], "egl"))
 def test_a_wish_that_is_not_there_does_not_spoil_the_other(hide, other):
     """PyOpenGL has settled on what is not there when mujoco was first imported."""
@@ -214,6 +215,7 @@ FORKING = """
 """
 
 
+@pytest.mark.long
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork here")
 @pytest.mark.parametrize(
     ("method", "when", "expected"),
@@ -259,6 +261,7 @@ def test_a_fork_without_a_wish_is_told_too(tmp_path):
     assert done.stderr.startswith("this process was forked from one that had used OpenGL")
 
 
+@pytest.mark.long
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork here")
 def test_a_renderer_from_before_a_fork_is_refused(backend):
     done = run(
@@ -373,6 +376,7 @@ def test_many_environments_and_threads_leave_nothing(wish, count):
     assert (done.returncode, done.stderr) == (0, ""), done.stderr
 
 
+@pytest.mark.long
 def test_with_opengl_switched_off_the_sketch_renderer_draws():
     done = run(FORGETFUL, **{gl.VARIABLE: "disable"})
     assert (done.returncode, done.stdout.strip(), done.stderr) == (0, "sketch", "")

@@ -86,6 +86,7 @@ def test_a_path_ends_in_another_mark_if_it_lasted():
     assert marks == ["None", "o", "s", "None", "o", "X"]
 
 
+@pytest.mark.long
 def test_where_there_is_nothing_a_plot_is_still_one(tmp_path):
     empty = np.full((3, 2), np.nan)
     for kind in LEGENDS:

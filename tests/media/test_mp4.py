@@ -41,6 +41,7 @@ def test_without_the_encoder_a_gif_is_written(tmp_path, monkeypatch, caplog):
     ]
 
 
+@pytest.mark.long
 def test_without_pyav_a_gif_is_written(tmp_path):
     code = """
         import sys, numpy

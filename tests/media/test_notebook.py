@@ -19,6 +19,7 @@ def result():
     return train(CONFIG)
 
 
+@pytest.mark.long
 def test_results_and_policies_have_a_picture(result):
     pytest.importorskip("matplotlib")
     for shown in (result, result.policy):

@@ -29,7 +29,7 @@ def a_figure():
     return figure
 
 
-@pytest.mark.parametrize("suffix", few([*SUFFIXES, ".PNG"], ".pdf", ".svg", ".PNG"))
+@pytest.mark.parametrize("suffix", few([*SUFFIXES, ".PNG"], ".svg", ".PNG", long=(".pdf",)))
 def test_the_suffix_says_what_is_written(suffix, tmp_path):
     write_plot(a_figure(), tmp_path / f"a{suffix}")
     begins = {".png": b"\x89PNG", ".svg": b"<?xml", ".pdf": b"%PDF"}[suffix.lower()]
@@ -82,6 +82,7 @@ def test_without_matplotlib_the_message_says_how_to_get_it(monkeypatch):
         a_figure()
 
 
+@pytest.mark.long
 def test_plotting_opens_no_window_and_leaves_pyplot_alone(tmp_path):
     code = (
         "import sys\nfrom mjcartpole.media.plots import *\nwith plot_style():\n"

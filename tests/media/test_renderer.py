@@ -142,7 +142,7 @@ def test_the_fan_is_faint_and_moves_with_the_cart(renderer):
         assert np.abs(outside - background).max() < 3
 
 
-@pytest.mark.parametrize("quality", few(["draft", "normal", "high"], "draft", "high"))
+@pytest.mark.parametrize("quality", few(["draft", "normal", "high"], "draft", long=("high",)))
 def test_a_part_that_is_drawn_again_equals_a_whole_picture(cartpole, quality):
     """Only a box is drawn for each frame; but for rounding nobody can tell."""
     if (backend := gl.find_backend()) is None:
@@ -313,6 +313,7 @@ def test_a_failing_drawing_context_is_a_render_error(cartpole, monkeypatch):
         GLRenderer(Scene(cartpole, 16, 16, "side"), backend)
 
 
+@pytest.mark.long
 def test_egl_osmesa_and_sketch_show_the_same(cartpole, tmp_path):
     """The other OpenGL in a process of its own, since one process can only have one of them."""
     code = """

@@ -101,6 +101,7 @@ def test_threads_draw_with_one_environment_and_with_their_own(kind, end):
     assert run(TOGETHER, kind, end) == (0, "")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "envs", [*(pytest.param(envs, marks=pytest.mark.slow) for envs in ("one", "own")), "new"]
 )

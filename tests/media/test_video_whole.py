@@ -58,6 +58,7 @@ ENDLESS = """
 """
 
 
+@pytest.mark.long
 @pytest.mark.skipif(os.name == "nt", reason="kill ends a process without a word there")
 @pytest.mark.parametrize("name", few(["run.mp4", "run.gif", "run.webp", "run"], "run.mp4"))
 @pytest.mark.parametrize(
@@ -113,6 +114,7 @@ FULL = """
 """
 
 
+@pytest.mark.long
 @pytest.mark.skipif(os.name == "nt", reason="limits the size of files")
 @pytest.mark.parametrize("most", few([30, 100_000], 100_000))
 @pytest.mark.parametrize("name", few(["run.mp4", "run.gif", "run.webp", "run"], "run.mp4"))
@@ -146,6 +148,7 @@ GROWING = """
 """
 
 
+@pytest.mark.long
 @pytest.mark.skipif(sys.platform != "linux", reason="counts in Linux's kilobytes")
 @pytest.mark.parametrize(
     "count", [400, pytest.param(20_000, marks=pytest.mark.slow)], ids=["short", "long"]
@@ -157,6 +160,7 @@ def test_memory_does_not_grow_with_the_length(tmp_path, name, count):
     assert int(done.stdout) < 4_000  # kilobytes; all frames would be 23 MB or 1.1 GB
 
 
+@pytest.mark.long
 def test_writing_is_silent(tmp_path):
     code = f"""
         import numpy

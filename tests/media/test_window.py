@@ -24,6 +24,7 @@ def test_without_a_screen_it_says_so_and_goes_on(monkeypatch, caplog):
     window.close()
 
 
+@pytest.mark.long
 @pytest.mark.skipif(sys.platform != "linux", reason="DISPLAY is X11's")
 def test_a_display_that_does_not_answer_is_no_screen():
     code = (

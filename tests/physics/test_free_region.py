@@ -73,6 +73,7 @@ def test_another_task_asks_for_another_room():
         assert np.isfinite(free_region(load_model(), task=task).box(wide_box(task))).all()
 
 
+@pytest.mark.long
 def test_contacts_are_sought_where_a_task_lets_the_pole_go():
     low = f'<geom name="low" type="box" size="5 1 0.05" pos="0 0 -0.7" {TOUCHING}/>'
     hits = load_model(

@@ -15,6 +15,7 @@ print({"OpenGL", "imageio", "dm_control"} & set(sys.modules))
 """
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "choice",
     [

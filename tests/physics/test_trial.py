@@ -44,6 +44,7 @@ def test_a_document_that_ends_by_itself_is_answered(text, answer):
     assert bool(done.stdout) == bool(answer)
 
 
+@pytest.mark.long
 def test_the_system_ends_what_takes_too_long():
     done = run(LOOP, seconds=1)
     assert done.returncode < 0

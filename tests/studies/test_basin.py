@@ -14,6 +14,7 @@ from mjcartpole.learning.policy import Policy
 from mjcartpole.studies.basin import basin, limit_along, survival
 from mjcartpole.studies.policy_setup import PolicySetup
 from mjcartpole.task import CARTPOLE_V1, SWING_UP
+from nightly import few
 
 BANG = Discretizer((1, 1, 2, 1), (-2.4, -1, -0.2, -1), (2.4, 1, 0.2, 1))
 LEANS = Policy(BANG, np.array([1.0, 0.0, 0.0, 1.0]).reshape(1, 1, 2, 1, 2))
@@ -24,7 +25,7 @@ def starts(n=20, poles=1):
     return np.random.default_rng(0).uniform(-0.15, 0.15, (n, 2 + 2 * poles))
 
 
-@pytest.mark.parametrize("backend", ["mujoco", "gym"])
+@pytest.mark.parametrize("backend", few(["mujoco", "gym"], "gym", long=("mujoco",)))
 def test_both_engines_agree_with_episodes_played_one_by_one(backend):
     setup = PolicySetup("leans", LEANS, backend)
     found = survival(setup, starts())
@@ -36,7 +37,7 @@ def test_both_engines_agree_with_episodes_played_one_by_one(backend):
     assert len(set(found.tolist())) > 5
 
 
-@pytest.mark.parametrize("backend", ["mujoco", "gym"])
+@pytest.mark.parametrize("backend", few(["mujoco", "gym"], "gym", long=("mujoco",)))
 def test_both_engines_disturb_alike(backend):
     vary = {"vary": "pole.length=0.5:2", "pool": 3} if backend == "mujoco" else {}
     some = Disturbances(**vary, delay=1, noise=0.02, hold=0.1, push="0.5@~0.5s", sensor_delay=1)
@@ -97,6 +98,7 @@ def test_others_are_held_where_it_is_asked():
     assert "x = 2.39" in near.notes[0]
 
 
+@pytest.mark.long
 def test_where_no_angle_ends_an_episode_the_table_says_how_far():
     assert limit_along(2, SWING_UP) is None
     assert limit_along(0, CARTPOLE_V1) == 2.4

@@ -149,6 +149,7 @@ def test_slow_motion_lies_between_the_states(take):
     assert np.allclose(states[2::4], middle, rtol=0, atol=1e-15)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("fps", [25, 50])
 def test_a_fall_is_the_last_second_in_slow_motion(fps):
     take = play(PolicySetup("balancing", balancing_policy(), seed=3))[0]
@@ -206,6 +207,7 @@ def test_several_start_alike_and_each_is_what_it_is_alone():
             assert np.array_equal(frame[top : top + HEIGHT, left : left + WIDTH], alone)
 
 
+@pytest.mark.long
 def test_several_begin_each_episode_together():
     casts = [play(PolicySetup(f"{seed}", some_policy(seed)), 3) for seed in (0, 1)]
     lengths = [[len(take.states) for take in takes] for takes in casts]

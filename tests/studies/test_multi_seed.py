@@ -49,6 +49,7 @@ def test_each_seed_is_as_if_it_was_trained_alone(config, workers):
     assert_as_alone(many, config)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("backend", few(["gym", "mujoco"], "mujoco"))
 def test_the_python_engine_gives_the_same(backend):
     config = TrainConfig(episodes=3, backend=backend)

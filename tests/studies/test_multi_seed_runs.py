@@ -241,6 +241,7 @@ def test_a_seed_that_is_a_link_is_refused_and_nothing_is_lost(overwrite, tmp_pat
     assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == before
 
 
+@pytest.mark.long
 def test_an_overwriting_that_was_killed_is_gone_on_with(tmp_path):
     train_in(tmp_path)
     (tmp_path / "seed-2" / "config.json").unlink()

@@ -235,6 +235,7 @@ def test_a_saved_policy_is_one_as_any_other(tmp_path):
 SHORT = ["train", "--method", "identify", "--episodes", "20", "--backend", "gym", "--no-video"]
 
 
+@pytest.mark.long
 def test_what_is_printed_says_what_is_dreamt(here, capsys):
     more = ["--log-every", "10", "--evaluate-every", "10", "--run-dir", "run", "--until", "9"]
     code, out, err = call([*SHORT, *more], capsys)

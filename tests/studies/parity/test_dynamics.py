@@ -30,6 +30,7 @@ UPS = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "up",
     [up if up == "oblique" else pytest.param(up, marks=pytest.mark.slow) for up in UPS],

@@ -319,6 +319,7 @@ def test_a_plot_shows_what_its_rows_say(results):
     assert [float(line.get_xdata()[0]) for line in axes[0].lines[1::2]] == averages
 
 
+@pytest.mark.long
 def test_the_command_writes_it_and_says_it(folder, capsys):
     code, out, err = call(["study", "report", folder, "--baseline", "alpha=0.3"], capsys)
     assert (code, err) == (0, "")
