@@ -358,10 +358,7 @@ def test_an_interrupted_film_leaves_nothing(runs, here, name, number, code):
 
 
 @pytest.mark.skipif(os.name == "nt", reason="kill ends a process without a word there")
-@pytest.mark.parametrize(
-    ("number", "code"),
-    [(signal.SIGINT, 130), (signal.SIGTERM, 143)],
-)
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 @pytest.mark.slow
 def test_an_interrupted_mp4_leaves_the_old_one(runs, here, number, code):
     (here / "out").mkdir()

@@ -12,6 +12,7 @@ from mjcartpole.learning.checkpoints import LATEST
 from trainings import FILM, NINE, SHORT, SLOW, assert_equal_runs, names, wait_until
 
 
+@pytest.mark.long
 def test_one_run_folder_has_one_training_while_it_lives(here, fork, slow_reference, capsys):
     child = fork([*SLOW, "--run-dir", "run", "--checkpoint-every", "0.05"])
     wait_until((here / "run" / LATEST).exists, child)
