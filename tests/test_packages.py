@@ -110,7 +110,7 @@ def three(tmp_path_factory):
         # -S: without the packages of this environment.
         done = subprocess.run(
             [sys.executable, "-S", *words],
-            env={**os.environ, "PYTHONPATH": str(site)},
+            env={**os.environ, "PYTHONPATH": str(site), "MUJOCO_GL": "disable"},
             cwd=tmp_path_factory.mktemp("here"),
             capture_output=True,
             text=True,

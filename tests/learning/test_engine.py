@@ -56,7 +56,7 @@ def trained_here():
 def trained_elsewhere(**environment):
     done = subprocess.run(
         [sys.executable, "-c", textwrap.dedent(TRAININGS)],
-        env={**os.environ, **environment},
+        env={**os.environ, "MUJOCO_GL": "disable", **environment},
         capture_output=True,
         text=True,
         timeout=120,

@@ -1,5 +1,6 @@
 import itertools
 import math
+import os
 import subprocess
 import sys
 import threading
@@ -335,7 +336,9 @@ with open_renderer(load_model(), kind=kind) as renderer:
     for kind in {"egl", "osmesa"} - here:
         if sys.platform == "linux" and gl.works(kind):
             paths = [str(tmp_path / "states.npy"), str(tmp_path / f"{kind}.npy")]
-            subprocess.run([sys.executable, "-c", code, kind, *paths], check=True, timeout=120)
+            wish = {"MUJOCO_GL": kind, "PYOPENGL_PLATFORM": kind}
+            command = [sys.executable, "-c", code, kind, *paths]
+            subprocess.run(command, env={**os.environ, **wish}, check=True, timeout=120)
             frames[kind] = np.load(paths[1]).astype(float)
     if len(frames) == 1:
         pytest.skip("neither EGL nor OSMesa works here")
