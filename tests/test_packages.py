@@ -153,6 +153,7 @@ def test_three_packages_are_enough_for_all_rungs_but_the_third_witness(three):
     assert last.startswith("10 skipped dm_control does not load: ")
 
 
+@pytest.mark.long
 def test_what_lacks_a_package_says_in_one_line_what_to_type(three):
     code = """
         import io, contextlib

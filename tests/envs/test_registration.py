@@ -4,6 +4,7 @@ import subprocess
 import sys
 
 import gymnasium
+import pytest
 
 import mjcartpole
 from mjcartpole.envs.registration import ENV_ID, register
@@ -26,6 +27,7 @@ def test_registering_twice_does_nothing():
     assert gymnasium.registry[ENV_ID] is before
 
 
+@pytest.mark.long
 def test_one_word_brings_the_package_and_the_environment():
     """Where nothing of ours is imported yet, gymnasium does it."""
     code = (

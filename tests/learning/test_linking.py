@@ -7,6 +7,7 @@ from pathlib import Path
 
 import mujoco
 import numpy as np
+import pytest
 
 from mjcartpole.learning import linking
 from mjcartpole.physics.library import libmujoco
@@ -31,6 +32,7 @@ def test_what_is_no_library_is_a_reason(tmp_path):
         assert path.name in linking.link(path)
 
 
+@pytest.mark.long
 def test_a_library_without_mj_step_is_a_reason():
     """In a process where nothing else has brought mj_step along."""
     extensions = sysconfig.get_config_var("EXT_SUFFIX")
