@@ -183,6 +183,19 @@ def test_module_and_version(here):
 
 
 @pytest.mark.slow
+def test_only_a_process_of_its_own_looks_for_garbage_seldom(here):
+    code = (
+        "import sys, gc, atexit; from mjcartpole.cli import main; before = gc.get_threshold()\n{}"
+    )
+    told = (
+        "atexit.register(lambda: print(gc.get_threshold() == before, gc.get_freeze_count() > 0))\n"
+    )
+    for words, expected in (("main()", "False True"), ("main(['-V'])", "True False")):
+        command = [sys.executable, "-c", code.format(told + words), "--version"]
+        done = subprocess.run(command, capture_output=True, text=True, check=True)
+        assert done.stdout.splitlines()[-1] == expected
+
+
 def test_a_reader_that_leaves_early_is_no_error(here):
     process = start(["train", *QUICK], here)
     process.stdout.close()

@@ -4,7 +4,9 @@ Results go to stdout, progress and errors to stderr. Exit codes: 0, 2 for a user
 results that could not be printed, 130 after Ctrl-C.
 """
 
+import atexit
 import contextlib
+import gc
 import logging
 import os
 import sys
@@ -22,6 +24,8 @@ INTERRUPTED = 130
 
 def main(argv: Sequence[str] | None = None) -> NoReturn:
     """Run a command and exit with its code."""
+    if argv is None:  # The process is this command's own.
+        _collect_rarely()
     with patient_output():
         code = _exit_code(list(sys.argv[1:] if argv is None else argv))
         problem = stdout_problem()
@@ -30,6 +34,12 @@ def main(argv: Sequence[str] | None = None) -> NoReturn:
             _complain(f"error: stdout could not be written ({reason}); all else went on without it")
             code = code or FAILED
     sys.exit(code)
+
+
+def _collect_rarely() -> None:
+    """Have Python look for garbage seldom, and not at exit: what a start makes is there to stay."""
+    gc.set_threshold(100_000)
+    atexit.register(gc.freeze)
 
 
 def _exit_code(argv: list[str]) -> int:
