@@ -196,6 +196,7 @@ def test_only_a_process_of_its_own_looks_for_garbage_seldom(here):
         assert done.stdout.splitlines()[-1] == expected
 
 
+@pytest.mark.slow
 def test_a_reader_that_leaves_early_is_no_error(here):
     process = start(["train", *QUICK], here)
     process.stdout.close()
