@@ -115,7 +115,8 @@ def test_all_mistakes_are_told_at_once():
 
 def test_tables_that_are_too_deep_are_refused(tmp_path):
     (tmp_path / "a.toml").write_text(f"[factors.{'.'.join('a' * 3000)}]\nx = 1")
-    with pytest.raises(FileError, match="is no study: tables or lists in it are too deep"):
+    # The reader of newer Pythons refuses them itself.
+    with pytest.raises(FileError, match=r"lists in it are too deep|is no TOML: .* 1000 parts"):
         read_study(tmp_path / "a.toml")
 
 
