@@ -5,10 +5,14 @@ VENV ?= .venv
 # A file of versions to keep to: make test CONSTRAINTS=constraints/ci.txt
 CONSTRAINTS ?=
 BIN = $(VENV)/bin
+# uv installs in a fifth of the time, where it is there; `make UV= …` takes pip all the same.
+UV := $(shell command -v uv)
 # Every warning fails, once all are told; a reference to nothing is one.
 STRICT = --fail-on-warning --keep-going --nitpicky --quiet --doctree-dir build/doctrees
+CREATE = $(if $(UV),$(UV) venv --quiet --allow-existing --seed --python $(PYTHON),$(PYTHON) -m venv)
 # Python compiles what it imports; to compile all that is installed is half of the installation's time.
-INSTALL = $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile $(CONSTRAINTS:%=--constraint %)
+PIP = $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile
+INSTALL = $(if $(UV),$(UV) pip install --quiet --python $(BIN)/python,$(PIP)) $(CONSTRAINTS:%=--constraint %)
 
 .PHONY: help train page test-page test test-ci test-all test-mujoco4 coverage lint bench docs docs-links release-check constraints clean
 .DELETE_ON_ERROR:
@@ -91,7 +95,7 @@ $(VENV)/installed: pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 	  { echo "mjcartpole needs Python 3.11 or newer; try: make PYTHON=python3.11" >&2; exit 1; }
 	@echo "Setting up $(VENV): the first time this takes a minute or two."
-	$(PYTHON) -m venv $(VENV)
+	$(CREATE) $(VENV)
 	$(INSTALL) --editable .
 	@touch $@
 
