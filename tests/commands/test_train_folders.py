@@ -111,7 +111,7 @@ def test_a_film_of_another_run_stays(here, capsys):
         assert f"video  videos/{film}.mp4" in call([*FILM, name], capsys)[1]
         assert json.loads(Path(name, "summary.json").read_text())["video"] == f"videos/{film}.mp4"
     before = {path: path.read_bytes() for path in Path("videos").iterdir()}
-    out = call([*FILM, "b/run", "--overwrite", "--alpha", "0.7"], capsys)[1]
+    out = call([*FILM, "b/run", "--overwrite", "--seed", "3"], capsys)[1]
     assert "video  videos/run-2.mp4" in out
     after = {path: path.read_bytes() for path in Path("videos").iterdir()}
     changed = [path.name for path in before if before[path] != after[path]]
