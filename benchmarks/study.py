@@ -64,8 +64,8 @@ def main() -> None:
                 found[name].append(took)
                 told(name, found["alone"][-1:], [took], asked.workers)
     print("all turns together:")
-    for name in found:
-        told(name, found["alone"], found[name], asked.workers)
+    for name, each in found.items():
+        told(name, found["alone"], each, asked.workers)
 
 
 def turn(
@@ -97,7 +97,7 @@ def apart(workers: int, runs: Runs) -> Iterator[ProcessPoolExecutor]:
     """Yield so many processes that have done a training."""
     spawn = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(workers, spawn, initializer=warm, initargs=(runs[:1],)) as pool:
-        list(pool.map(alone, [runs[:8]] * workers))
+        list(pool.map(alone, [runs[:1]] * workers))  # Each is there, and warm.
         yield pool
 
 

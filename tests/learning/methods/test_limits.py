@@ -51,7 +51,12 @@ def memory_of(training):
 
 @pytest.mark.parametrize("name", CONFIGS)
 def test_what_training_comes_to_is_taken(name):
-    training_of(name).learner.check(memory_of(training_of(name)))
+    training = training_of(name)
+    training.learner.check(memory_of(training))
+    another = Training(training.config, engine="python")
+    another.restore(training.snapshot())
+    for field, array in memory_of(training).items():
+        np.testing.assert_array_equal(memory_of(another)[field], array)
 
 
 @pytest.mark.parametrize("method", METHODS)
