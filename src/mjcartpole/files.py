@@ -178,11 +178,7 @@ def make_folder(path: str | os.PathLike[str]) -> Path:
 
 
 def check_writable(folder: Path) -> None:
-    """Refuse a folder in which no file can be made, before any work is put into one.
-
-    Raises:
-        FileError: See above.
-    """
+    """Refuse a folder in which no file can be made, before any work is put into one (FileError)."""
     with _temporary(folder / "probe"):
         pass
 

@@ -9,9 +9,5 @@ Integrator = Literal["gym", "mujoco"]
 
 
 def check_integrator(integrator: str) -> None:
-    """Refuse an integrator that does not exist.
-
-    Raises:
-        ConfigError: See above.
-    """
+    """Refuse an integrator that does not exist (ConfigError)."""
     check_known("integrator", integrator, get_args(Integrator))

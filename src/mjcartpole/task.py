@@ -62,11 +62,7 @@ class Task:
     continuous: bool = False
 
     def __post_init__(self) -> None:
-        """Refuse rules that make no sense.
-
-        Raises:
-            ConfigError: See above.
-        """
+        """Refuse rules that make no sense (ConfigError)."""
         # Without the sum, numpy calls 0.0 to -0.0 a range that runs backwards.
         object.__setattr__(self, "start_high", self.start_high + 0.0)
         bounds = self.start_low, self.start_high

@@ -37,11 +37,7 @@ def prepare(config: TrainConfig, how: TrainOptions) -> CartPole:
 
 
 def check(how: TrainOptions) -> None:
-    """Refuse options that make no sense.
-
-    Raises:
-        ConfigError: See above.
-    """
+    """Refuse options that make no sense (ConfigError)."""
     silence_mujoco()
     check_interval(how.checkpoint_every)
     if how.tensorboard:

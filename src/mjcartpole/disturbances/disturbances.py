@@ -87,11 +87,7 @@ class Disturbances(WorldDisturbances):
         def __init__(self, **values: Any) -> None: ...  # noqa: ANN401
 
     def __post_init__(self) -> None:
-        """Refuse what makes no sense, and put values in their usual form.
-
-        Raises:
-            ConfigError: See above.
-        """
+        """Refuse what makes no sense, and put values in their usual form (ConfigError)."""
         self._put("vary", tuple(each.text for each in parse_ranges(self.vary)))
         self._put("push", tuple(each.text for each in _parse_shoves(self.push)))
         for name in ("noise", "bias", "quantize"):
@@ -165,11 +161,7 @@ class Disturbances(WorldDisturbances):
         return Disturbances(**known, **own)
 
     def check_apart(self, edits: Iterable[str]) -> None:
-        """Refuse numbers that are edited and vary: the edit would have no effect.
-
-        Raises:
-            ConfigError: See above.
-        """
+        """Refuse numbers that are edited and vary: the edit would have no effect (ConfigError)."""
         varied = {each.name for each in self.ranges}
         for name in edits:
             if name in varied:
@@ -197,11 +189,7 @@ class Disturbances(WorldDisturbances):
         return "push" if any(each.at is not None for each in _parse_shoves(self.push)) else ""
 
     def check_fits(self, task: Task) -> None:
-        """Refuse what no episode of a task is long enough for.
-
-        Raises:
-            ConfigError: See above.
-        """
+        """Refuse what no episode of a task is long enough for (ConfigError)."""
         for name in ("delay", "sensor_delay"):
             if getattr(self, name) >= task.time_limit:
                 raise ConfigError(

@@ -29,11 +29,7 @@ def check_backend(
     *,
     own_timestep: bool = False,
 ) -> None:
-    """Refuse a backend that does not exist, or settings that it would ignore.
-
-    Raises:
-        ConfigError: See above.
-    """
+    """Refuse a backend that does not exist, or settings that it would ignore (ConfigError)."""
     check_known("backend", backend, get_args(Backend))
     check_integrator(integrator)
     others = (*edits, *(("own-timestep",) if own_timestep else ()))

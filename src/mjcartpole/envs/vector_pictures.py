@@ -68,11 +68,7 @@ class VectorPictures:
 
 
 def check_render_mode(render_mode: str | None) -> None:
-    """Refuse a render mode that a vector does not have.
-
-    Raises:
-        ConfigError: See above.
-    """
+    """Refuse a render mode that a vector does not have (ConfigError)."""
     if render_mode is not None and render_mode not in get_args(VectorRenderMode):
         raise ConfigError(
             f"render_mode {render_mode!r} is not for a vector that moves as one; available: None, "

@@ -246,11 +246,7 @@ def _added(
 
 
 def check_visits(visits: npt.NDArray[np.int64], size: int, steps: int) -> None:
-    """Refuse visits that a training of so many steps cannot have made.
-
-    Raises:
-        ValueError: See above.
-    """
+    """Refuse visits that a training of so many steps cannot have made (ValueError)."""
     if visits.size != size or (visits < 0).any() or int(visits.sum()) != steps:
         raise ValueError("visits that are not those of its episodes")
 
@@ -278,11 +274,7 @@ def _array(archive: zipfile.ZipFile, name: str, kind: npt.DTypeLike, most: int) 
 
 
 def _check_snapshot(snapshot: Snapshot, period: int | None) -> None:
-    """Refuse numbers that no training can have come to.
-
-    Raises:
-        ValueError: See above.
-    """
+    """Refuse numbers that no training can have come to (ValueError)."""
     totals, steps, endings, sides = snapshot.columns
     if len({len(column) for column in snapshot.columns}) > 1:
         raise ValueError("columns of episodes that do not fit together")

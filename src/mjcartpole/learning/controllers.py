@@ -67,11 +67,7 @@ class Controller:
         return np.array([min(max(self.effort(observation.tolist()), -1.0), 1.0)], np.float32)
 
     def check_fits(self, poles: int, where: str) -> None:
-        """Refuse to play with another number of poles than it is for.
-
-        Raises:
-            ConfigError: See above.
-        """
+        """Refuse to play with another number of poles than it is for (ConfigError)."""
         if self.poles not in (None, poles):
             raise ConfigError(
                 f"{self.name} is for {in_words(self.poles or 0)}, and {where} has {in_words(poles)}"

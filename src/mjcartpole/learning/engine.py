@@ -19,11 +19,7 @@ _said: set[str] = set()
 
 
 def check_engine(engine: str) -> None:
-    """Refuse an engine that does not exist.
-
-    Raises:
-        ConfigError: See above.
-    """
+    """Refuse an engine that does not exist (ConfigError)."""
     check_known("engine", engine, get_args(Engine))
 
 

@@ -202,11 +202,7 @@ def evaluate_where_trained(
 
 
 def check_count(episodes: int, seed: int) -> None:
-    """Refuse numbers of episodes below 1 and seeds below 0.
-
-    Raises:
-        ConfigError: See above.
-    """
+    """Refuse numbers of episodes below 1 and seeds below 0 (ConfigError)."""
     if episodes < 1:
         raise ConfigError(f"episodes must be a whole number from 1 up, not {episodes}")
     if seed < 0:

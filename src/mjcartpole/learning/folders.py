@@ -94,11 +94,7 @@ def _acquired(folder: Path, make: bool, tries: int = 100) -> "filelock.BaseFileL
 
 
 def check_here(folder: Path) -> None:
-    """Refuse a run inside a folder of many that in truth lies elsewhere.
-
-    Raises:
-        RunError: See above.
-    """
+    """Refuse a run inside a folder of many that in truth lies elsewhere (RunError)."""
     if folder.is_symlink() and SEEDS in names_in(folder.parent):
         raise RunError(
             f"'{folder}' is a link: what it leads to is no part of these runs; remove it, or put "

@@ -50,11 +50,7 @@ class Learner:
         self._discretizer = discretizer
 
     def check(self, memory: dict[str, npt.NDArray[Any]]) -> None:
-        """Refuse a memory that no training can have come to.
-
-        Raises:
-            ValueError: See above; names the field.
-        """
+        """Refuse a memory that no training can have come to (ValueError; names the field)."""
         found = type(self.memory)(**memory)
         check_limits(found, self._discretizer)
         if hasattr(self.method, "check_memory"):

@@ -51,11 +51,7 @@ def names_of(grid: Discretizer) -> tuple[str, ...]:
 
 
 def check_of_state(grid: Discretizer, names: Iterable[str]) -> None:
-    """Refuse dimensions of a table that are none of a state.
-
-    Raises:
-        ConfigError: See above.
-    """
+    """Refuse dimensions of a table that are none of a state (ConfigError)."""
     known = names_of(grid)
     for name in names:
         check_known("dimension of a state", name, known[: len(known) - grid.actions])

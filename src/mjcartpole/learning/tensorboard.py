@@ -22,11 +22,7 @@ _ONE_STATE: Final = Discretizer((1,), (-1.0,), (1.0,))
 
 
 def check_writer() -> None:
-    """Refuse where the writer is missing.
-
-    Raises:
-        ConfigError: See above.
-    """
+    """Refuse where the writer is missing (ConfigError)."""
     check_installed("--tensorboard", "tensorboardX")
 
 

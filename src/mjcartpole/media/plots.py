@@ -44,11 +44,7 @@ def is_installed() -> bool:
 
 
 def check_installed() -> None:
-    """Refuse where matplotlib is missing.
-
-    Raises:
-        RenderError: See above.
-    """
+    """Refuse where matplotlib is missing (RenderError)."""
     packages.check_installed("a plot", "matplotlib", RenderError)
 
 

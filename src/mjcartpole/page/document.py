@@ -77,11 +77,7 @@ def page_html(runs: Sequence[Mapping[str, Any]], assets: Path = ASSETS) -> str:
 
 
 def check_built(assets: Path = ASSETS) -> None:
-    """Refuse to go on where web/ was not built.
-
-    Raises:
-        ConfigError: See above.
-    """
+    """Refuse to go on where web/ was not built (ConfigError)."""
     if missing := [name for name in _NAMES if not (assets / name).is_file()]:
         raise ConfigError(
             f"what web/ builds is not in '{assets}' ({', '.join(missing)} missing); in a checkout "

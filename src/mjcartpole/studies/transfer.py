@@ -53,11 +53,7 @@ class Place:
         return 1 if self.cartpole is None else self.cartpole.poles
 
     def check_disturbances(self, task: Task) -> None:
-        """Refuse disturbances that make no sense here by these rules.
-
-        Raises:
-            ConfigError: See above.
-        """
+        """Refuse disturbances that make no sense here by these rules (ConfigError)."""
         effects_on(self.cartpole, self.disturbances, task)
         if self.cartpole and self.disturbances.vary:
             contexts_of(self.cartpole, self.disturbances)

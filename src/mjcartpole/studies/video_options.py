@@ -59,11 +59,7 @@ class VideoOptions:
         return int(self.size.lower().partition("x")[2])
 
     def check(self, cartpole: "CartPole") -> None:
-        """Refuse what makes no sense, before anything is played.
-
-        Raises:
-            RenderError: See above.
-        """
+        """Refuse what makes no sense, before anything is played (RenderError)."""
         from mjcartpole.media.scene import check_picture  # noqa: PLC0415 - it imports MuJoCo
 
         check_picture(cartpole, self.width, self.height, self.camera)

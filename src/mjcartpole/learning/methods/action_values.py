@@ -39,11 +39,7 @@ class DiscountParameters(Parameters):
     """Discount per step."""
 
     def check_parameters(self) -> None:
-        """Refuse values that make no sense.
-
-        Raises:
-            ConfigError: See above.
-        """
+        """Refuse values that make no sense (ConfigError)."""
         self._check_shares("gamma")
 
 
@@ -57,11 +53,7 @@ class StepSizeParameters(DiscountParameters):
     """Step size once decayed."""
 
     def check_parameters(self) -> None:
-        """Refuse values that make no sense.
-
-        Raises:
-            ConfigError: See above.
-        """
+        """Refuse values that make no sense (ConfigError)."""
         super().check_parameters()
         self._check_shares("alpha", "alpha_final")
 
@@ -86,11 +78,7 @@ class ExplorationParameters(DiscountParameters):
     """Learn from the step that ends an episode (the article's code does not)."""
 
     def check_parameters(self) -> None:
-        """Refuse values that make no sense.
-
-        Raises:
-            ConfigError: See above.
-        """
+        """Refuse values that make no sense (ConfigError)."""
         super().check_parameters()
         self._check_shares("epsilon", "epsilon_final", "decay")
         self._check_one_of("ties", ("first", "random"))

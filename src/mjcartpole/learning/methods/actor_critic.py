@@ -50,11 +50,7 @@ class Parameters(PreferenceParameters):
     """The share of an error that the step before takes, and so on back; 0: one step alone."""
 
     def check_parameters(self) -> None:
-        """Refuse values that make no sense.
-
-        Raises:
-            ConfigError: See above.
-        """
+        """Refuse values that make no sense (ConfigError)."""
         super().check_parameters()
         self._check_shares("trace_lambda")
 

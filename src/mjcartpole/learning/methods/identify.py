@@ -55,22 +55,14 @@ class Parameters(q_learning.Parameters):
     3 for a rod, one episode for a linear model."""
 
     def check_parameters(self) -> None:
-        """Refuse values that make no sense.
-
-        Raises:
-            ConfigError: See above.
-        """
+        """Refuse values that make no sense (ConfigError)."""
         super().check_parameters()
         self._check_one_of("fit", ("rod", "linear"))
         if self.fit_steps is not None:
             self._check_whole("fit_steps", 1, 1_000_000)
 
     def check_world(self, poles: int, task: Task) -> None:
-        """Refuse what the model cannot be one of.
-
-        Raises:
-            ConfigError: See above.
-        """
+        """Refuse what the model cannot be one of (ConfigError)."""
         if poles != 1:
             raise ConfigError(
                 f"method 'identify' fits a cart with 1 pole, and the model has {in_words(poles)}; "

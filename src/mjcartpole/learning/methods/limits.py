@@ -31,11 +31,7 @@ NoTraces = Annotated[FloatMemory, lambda grid: (0, 0)]
 
 
 def check_limits(memory: Any, grid: Discretizer) -> None:
-    """Refuse values beyond their field's limits, or not finite.
-
-    Raises:
-        ValueError: See above; names the field.
-    """
+    """Refuse values beyond their field's limits, or not finite (ValueError; names the field)."""
     for name, kind in type(memory).__annotations__.items():
         values = np.asarray(getattr(memory, name))
         refuse(name, "has values that are not finite", ~np.isfinite(values))

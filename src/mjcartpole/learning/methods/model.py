@@ -58,11 +58,7 @@ class Parameters(CountParameters, ExplorationParameters):
     """Compute values after each episode, or only after one that the rules ended."""
 
     def check_parameters(self) -> None:
-        """Refuse values that make no sense.
-
-        Raises:
-            ConfigError: See above.
-        """
+        """Refuse values that make no sense (ConfigError)."""
         super().check_parameters()
         self._check_whole("sweeps", 1)
         self._check_positive("tolerance")

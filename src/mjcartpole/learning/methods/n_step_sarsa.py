@@ -47,11 +47,7 @@ class Parameters(TiledParameters):
     """Rewards that a target consists of before it bootstraps; 1 is SARSA."""
 
     def check_parameters(self) -> None:
-        """Refuse values that make no sense.
-
-        Raises:
-            ConfigError: See above.
-        """
+        """Refuse values that make no sense (ConfigError)."""
         super().check_parameters()
         self._check_whole("n_steps", 1, MOST_STEPS)
 

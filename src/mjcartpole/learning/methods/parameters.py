@@ -20,18 +20,10 @@ class Parameters:
     """Whether its table has nodes instead of bins, and values in between."""
 
     def check_parameters(self) -> None:
-        """Refuse values that make no sense.
-
-        Raises:
-            ConfigError: See above.
-        """
+        """Refuse values that make no sense (ConfigError)."""
 
     def check_world(self, poles: int, task: Task) -> None:
-        """Refuse a number of poles, or rules, that the method is not for.
-
-        Raises:
-            ConfigError: See above.
-        """
+        """Refuse a number of poles, or rules, that the method is not for (ConfigError)."""
 
     def _check_shares(self, *names: str) -> None:
         for name in names:

@@ -51,11 +51,7 @@ class Parameters(DiscountParameters):
     """… or after so many sweeps over all nodes."""
 
     def check_parameters(self) -> None:
-        """Refuse values that make no sense.
-
-        Raises:
-            ConfigError: See above.
-        """
+        """Refuse values that make no sense (ConfigError)."""
         super().check_parameters()
         self._check_positive("tolerance")
         self._check_whole("sweeps", 1)

@@ -50,11 +50,7 @@ class PreferenceParameters(StepSizeParameters):
     """Values of states start here."""
 
     def check_parameters(self) -> None:
-        """Refuse values that make no sense.
-
-        Raises:
-            ConfigError: See above.
-        """
+        """Refuse values that make no sense (ConfigError)."""
         super().check_parameters()
         self._check_shares("alpha_values", "alpha_values_final", "decay")
         if not is_finite(self.v_init):

@@ -65,11 +65,7 @@ class Parameters(TiledParameters):
     """Added to each error, so that no step is never replayed."""
 
     def check_parameters(self) -> None:
-        """Refuse values that make no sense.
-
-        Raises:
-            ConfigError: See above.
-        """
+        """Refuse values that make no sense (ConfigError)."""
         super().check_parameters()
         self._check_whole("replay_size", 1, 1_000_000)
         self._check_whole("replays", 1, 1_000)
@@ -124,11 +120,7 @@ def make_memory(p: Any, n_rows: int, rng: np.random.Generator) -> Memory:
 
 
 def check_memory(p: Any, memory: Memory) -> None:
-    """Refuse what no training can have come to.
-
-    Raises:
-        ValueError: See above.
-    """
+    """Refuse what no training can have come to (ValueError)."""
     known = min(memory.n_steps[0], p.replay_size)
     check_tree("tree", np.asarray(memory.tree), known, memory.largest[0])
 

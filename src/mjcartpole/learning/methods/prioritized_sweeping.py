@@ -68,11 +68,7 @@ class Parameters(CountParameters, ExplorationParameters):
     """Different states and actions that are remembered as having led to a state."""
 
     def check_parameters(self) -> None:
-        """Refuse values that make no sense.
-
-        Raises:
-            ConfigError: See above.
-        """
+        """Refuse values that make no sense (ConfigError)."""
         super().check_parameters()
         self._check_whole("planning", 1)
         self._check_whole("predecessors", 1)
@@ -118,11 +114,7 @@ def make_memory(p: Any, n_rows: int, rng: np.random.Generator) -> Memory:
 
 
 def check_memory(p: Any, memory: Any) -> None:
-    """Refuse what no training can have come to.
-
-    Raises:
-        ValueError: See above.
-    """
+    """Refuse what no training can have come to (ValueError)."""
     check_counts(p, memory)
     check_queue(memory)
     n, lists = memory.n_predecessors, memory.predecessors.reshape(-1, p.predecessors)

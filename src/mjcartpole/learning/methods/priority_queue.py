@@ -31,11 +31,7 @@ def make_queue(n: int) -> Queue:
 
 
 def check_queue(memory: Any) -> None:
-    """Refuse a queue that contradicts itself.
-
-    Raises:
-        ValueError: See above.
-    """
+    """Refuse a queue that contradicts itself (ValueError)."""
     waiting, places = memory.heap[: memory.n_queued[0]], np.arange(memory.n_queued[0])
     refuse("place", "is not where things are in heap", memory.place[waiting] != places + 1)
     refuse("place", "has things that wait nowhere", np.count_nonzero(memory.place) != len(waiting))

@@ -43,11 +43,7 @@ class Parameters(TiledParameters):
     """Learn after each episode from lambda-returns with this lambda; None: after each step."""
 
     def check_parameters(self) -> None:
-        """Refuse values that make no sense.
-
-        Raises:
-            ConfigError: See above.
-        """
+        """Refuse values that make no sense (ConfigError)."""
         super().check_parameters()
         if self.td_lambda is not None:
             self._check_shares("td_lambda")

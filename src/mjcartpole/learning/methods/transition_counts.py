@@ -42,11 +42,7 @@ class CountParameters(Parameters):
     """Different next states that are counted of a state and an action."""
 
     def check_parameters(self) -> None:
-        """Refuse values that make no sense.
-
-        Raises:
-            ConfigError: See above.
-        """
+        """Refuse values that make no sense (ConfigError)."""
         super().check_parameters()
         self._check_whole("successors", 1)
 
@@ -83,11 +79,7 @@ def make_counts(p: Any, n_rows: int) -> Counts:
 
 
 def check_places(n_rows: int, what: str, length: int, places: int) -> None:
-    """Refuse lists that would need too much memory.
-
-    Raises:
-        ConfigError: See above.
-    """
+    """Refuse lists that would need too much memory (ConfigError)."""
     if places > MOST:
         raise ConfigError(
             f"{n_rows:,} states with {length} {what} each make lists of {places:,} places; "
@@ -96,11 +88,7 @@ def check_places(n_rows: int, what: str, length: int, places: int) -> None:
 
 
 def check_counts(p: Any, memory: Any) -> None:
-    """Refuse counts that contradict each other.
-
-    Raises:
-        ValueError: See above.
-    """
+    """Refuse counts that contradict each other (ValueError)."""
     visits, seen = memory.visits, memory.seen[: memory.n_seen[0]]
     lists = memory.counts.reshape(-1, p.successors)
     refuse("counts", "has a gap in a list", (lists[:, :-1] == 0) & (lists[:, 1:] > 0))

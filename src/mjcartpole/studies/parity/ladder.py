@@ -28,11 +28,7 @@ RUNGS: dict[int, Callable[[Subject], Result]] = {
 
 
 def check_rungs(rungs: Sequence[int]) -> None:
-    """Refuse rungs that the ladder does not have.
-
-    Raises:
-        ConfigError: See above.
-    """
+    """Refuse rungs that the ladder does not have (ConfigError)."""
     unknown = sorted(set(rungs) - set(RUNGS))
     if unknown or not rungs:
         raise ConfigError(

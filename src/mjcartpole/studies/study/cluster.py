@@ -113,11 +113,7 @@ def versions_here() -> dict[str, str]:
 
 
 def check_versions(there: Mapping[str, str], here: Mapping[str, str], where: str) -> None:
-    """Refuse a worker that would find other figures.
-
-    Raises:
-        ConfigError: See above.
-    """
+    """Refuse a worker that would find other figures (ConfigError)."""
     for name in here:
         if there.get(name) != here[name]:
             raise ConfigError(

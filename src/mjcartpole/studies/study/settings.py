@@ -41,11 +41,7 @@ def is_edit(name: str) -> bool:
 
 
 def check_setting(name: str) -> None:
-    """Refuse what is neither a field of a training nor an edit.
-
-    Raises:
-        ConfigError: See above.
-    """
+    """Refuse what is neither a field of a training nor an edit (ConfigError)."""
     if not is_edit(name):
         return
     if name == "seed":
