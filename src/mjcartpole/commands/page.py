@@ -6,13 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from mjcartpole.commands.options import (
-    Command,
-    Included,
-    OutputPath,
-    Policies,
-    UsageError,
-)
+from mjcartpole.commands.options import Command, Included, OutputPath, Policies, UsageError
 from mjcartpole.files import check_free, check_writable, write_whole
 from mjcartpole.studies.eval_target import EvalTarget
 

@@ -4,13 +4,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mjcartpole.commands.options import (
-    Command,
-    Included,
-    OutputPath,
-    Policies,
-    UsageError,
-)
+from mjcartpole.commands.options import Command, Included, OutputPath, Policies, UsageError
 from mjcartpole.errors import FileError, RenderError
 from mjcartpole.files import check_free, check_writable
 from mjcartpole.learning.evaluation import check_count

@@ -29,11 +29,7 @@ from mjcartpole.physics.load import Edits, ModelLike, load_shared
 from mjcartpole.physics.simulation import FARTHEST_SANE, Simulation, State, as_seen, check_sane
 from mjcartpole.rewards import CONSTANT
 from mjcartpole.rules import Changes
-from mjcartpole.task import (
-    CARTPOLE_V1,
-    Task,
-    frame_rate,
-)
+from mjcartpole.task import CARTPOLE_V1, Task, frame_rate
 
 # What `step` needs, as plain globals: the fewest look-ups and no sign to change.
 _INT64 = np.int64

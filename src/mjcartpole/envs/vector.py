@@ -26,13 +26,7 @@ from mjcartpole.physics.bodies import starting_state
 from mjcartpole.physics.load import Edits, ModelLike, load_model
 from mjcartpole.rewards import CONSTANT
 from mjcartpole.rules import Changes
-from mjcartpole.task import (
-    CARTPOLE_V1,
-    Task,
-    frame_rate,
-    state_names,
-    worst_pole,
-)
+from mjcartpole.task import CARTPOLE_V1, Task, frame_rate, state_names, worst_pole
 
 _DEFAULT_PICTURE: Final = (DEFAULT_WIDTH, DEFAULT_HEIGHT, DEFAULT_CAMERA)
 

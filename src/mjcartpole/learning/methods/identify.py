@@ -16,11 +16,7 @@ from mjcartpole.errors import ConfigError
 from mjcartpole.learning.dream import look
 from mjcartpole.learning.fitted import Fitted, Linear, Rod, fit_linear, fit_rod
 from mjcartpole.learning.methods import q_learning
-from mjcartpole.learning.methods.action_values import (
-    FloatMemory,
-    draw_table,
-    greedy_values,
-)
+from mjcartpole.learning.methods.action_values import FloatMemory, draw_table, greedy_values
 from mjcartpole.learning.methods.limits import StepCounts
 from mjcartpole.learning.methods.parameters import numbers_class
 from mjcartpole.learning.methods.q_learning import act, after_episode, after_step, begin_episode

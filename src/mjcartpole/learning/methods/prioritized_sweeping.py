@@ -28,12 +28,7 @@ from mjcartpole.learning.methods.action_values import (
     learn_no_more,
 )
 from mjcartpole.learning.methods.experience import Transition
-from mjcartpole.learning.methods.limits import (
-    PairCounts,
-    Pairs,
-    StepCounts,
-    refuse,
-)
+from mjcartpole.learning.methods.limits import PairCounts, Pairs, StepCounts, refuse
 from mjcartpole.learning.methods.parameters import numbers_class
 from mjcartpole.learning.methods.priority_queue import check_queue, make_queue, pop, push
 from mjcartpole.learning.methods.transition_counts import (

@@ -15,12 +15,7 @@ import numpy as np
 from mjcartpole.errors import ConfigError
 from mjcartpole.learning.methods.action_values import FloatMemory, IntMemory, best
 from mjcartpole.learning.methods.experience import Transition
-from mjcartpole.learning.methods.limits import (
-    PairCounts,
-    Pairs,
-    StepCounts,
-    refuse,
-)
+from mjcartpole.learning.methods.limits import PairCounts, Pairs, StepCounts, refuse
 from mjcartpole.learning.methods.parameters import Parameters
 from mjcartpole.task import N_ACTIONS
 
