@@ -8,16 +8,16 @@ import pytest
 
 from mjcartpole.envs.backend import make_env
 from mjcartpole.envs.cartpole import CartPoleEnv
-from mjcartpole.envs.options import reset_options, rules_of, usual
+from mjcartpole.envs.options import rules_of, start_bounds
 from mjcartpole.envs.vector import CartPoleVectorEnv
 from mjcartpole.errors import ConfigError
 from mjcartpole.task import CARTPOLE_V1, Task
 
 
 def test_what_is_left_out_is_as_usual():
-    usually = usual(CARTPOLE_V1)
-    assert reset_options({}, usually) == usually == (-0.05, 0.05, ())
-    assert reset_options({"low": np.array(-0.2)}, usually) == (-0.2, 0.05, ())
+    usual = CARTPOLE_V1.start_low, CARTPOLE_V1.start_high
+    assert start_bounds({}, usual) == usual == (-0.05, 0.05)
+    assert start_bounds({"low": np.array(-0.2)}, usual) == (-0.2, 0.05)
 
 
 @pytest.mark.parametrize(

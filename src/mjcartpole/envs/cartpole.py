@@ -16,7 +16,7 @@ from mjcartpole.envs.disturber import Disturber
 from mjcartpole.envs.editable import Editable
 from mjcartpole.envs.names import CartPoleNames, refuse_slip
 from mjcartpole.envs.observations import Observation, observed, observer
-from mjcartpole.envs.options import added_of, reset_options, rules_of, usual
+from mjcartpole.envs.options import added_of, rules_of, start_bounds
 from mjcartpole.envs.pictures import InNotebooks, Pictures, RenderMode, warn_without_mode
 from mjcartpole.envs.spec import PortableSpec
 from mjcartpole.errors import ConfigError
@@ -187,7 +187,7 @@ class CartPoleEnv(
         self._observation = observation
         if self._task.continuous and type(self) is CartPoleEnv:
             raise ConfigError(f"{self._task.name} takes pushes; see ContinuousCartPoleEnv")
-        self._usual = usual(self._task)
+        self._bounds = self._task.start_low, self._task.start_high
         self._set_limits(self._task.x_limit, self._task.theta_limit)
         self.action_space = action_space(self._task)
         self.render_mode = render_mode
@@ -338,8 +338,10 @@ class CartPoleEnv(
                 or an edit makes no sense; nothing has changed then.
             ModelError: The edits make the model one that cannot be used.
         """
-        usual = self._usual
-        low, high, edits = usual if options is None else reset_options(options, usual)
+        (low, high), edits = self._bounds, None
+        if options is not None:
+            low, high = start_bounds(options, self._bounds, "edits")
+            edits = options.get("edits")
         simulation, disturber = self._simulation, self.disturber
         varies = disturber is not None and disturber.varies
         if not varies and (simulation is None or self._model.is_stale or edits):

@@ -2,9 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from typing import Any, NamedTuple, SupportsFloat
-
-from gymnasium.envs.classic_control.utils import maybe_parse_reset_bounds
+from typing import Any, SupportsFloat
 
 from mjcartpole.disturbances.disturbances import Disturbances
 from mjcartpole.errors import ConfigError
@@ -12,21 +10,7 @@ from mjcartpole.physics.edit.edits import edits_of
 from mjcartpole.physics.load import Edits
 from mjcartpole.rewards import minus_one_at_the_end
 from mjcartpole.rules import Changes
-from mjcartpole.task import CARTPOLE_V1, Task, resolve
-
-
-class ResetOptions(NamedTuple):
-    """How an episode starts; all of it holds until the next reset.
-
-    Attributes:
-        low: Lower bound of each of the starting state's values.
-        high: Upper bound.
-        edits: Changes of the model (see `load_model`); empty for none.
-    """
-
-    low: float = CARTPOLE_V1.start_low
-    high: float = CARTPOLE_V1.start_high
-    edits: Any = ()
+from mjcartpole.task import Task, resolve
 
 
 def rules_of(task: Task | str, changes: Changes, *, sutton_barto_reward: bool) -> Task:
@@ -77,72 +61,35 @@ def added_of(
     return added
 
 
-def usual(task: Task) -> ResetOptions:
-    """Return how an episode of a task starts without options."""
-    return ResetOptions(task.start_low, task.start_high)
-
-
-def reset_options(options: Mapping[str, Any], otherwise: ResetOptions) -> ResetOptions:
-    """Return the options of a reset, checked.
-
-    Args:
-        options: As they were given.
-        otherwise: What holds where they say nothing.
-
-    Raises:
-        ConfigError: There is no such option, a bound is no finite number, or low is above high.
-    """
-    given = otherwise._replace(**_known(options))
-    try:
-        # In gymnasium's own words, which CartPole-v1's users know.
-        low, high = maybe_parse_reset_bounds({"low": given.low, "high": given.high}, *otherwise[:2])
-    except (ValueError, OverflowError) as error:
-        raise ConfigError(str(error)) from error
-    if not math.isfinite(high - low):
-        raise ConfigError(f"reset starts between two finite bounds, not low={low}, high={high}")
-    return ResetOptions(low, high + 0.0, given.edits or ())
-
-
-def _known(options: Mapping[str, Any]) -> Mapping[str, Any]:
-    names = ResetOptions._fields
-    is_mapping = isinstance(options, Mapping)
-    others = [each for each in options if each not in names] if is_mapping else [options]
-    if others:
-        raise ConfigError(
-            f"reset takes a dict of the options {', '.join(names)}, not "
-            f"{', '.join(map(repr, others))}; a state is set after the reset, by "
-            "env.unwrapped.state = (…)"
-        )
-    return options
-
-
 def start_bounds(
-    task: Task, options: Mapping[str, Any] | None, *others: str
+    options: Mapping[str, Any], usual: tuple[float, float], *others: str
 ) -> tuple[float, float]:
-    """Return bounds of the starting states' values, as the vector's `reset(options=…)` gives them.
+    """Return bounds of the starting states' values, as `reset(options=…)` gives them.
 
-    >>> start_bounds(CARTPOLE_V1, {"low": -0.01})
+    >>> start_bounds({"low": -0.01}, (-0.05, 0.05))
     (-0.01, 0.05)
 
     Args:
-        task: Says where episodes start otherwise.
         options: What `reset` was given.
+        usual: The bounds where it says nothing.
         others: Options beside "low" and "high" that are read elsewhere.
 
     Raises:
         ConfigError: An option is unknown, a bound is no finite number, or low is above high.
     """
     known = ("low", "high", *others)
-    if not isinstance(options, Mapping | None):
+    if not isinstance(options, Mapping):
         raise ConfigError(f"options of reset are a dict, not {options!r}")
-    for name in options or {}:
+    for name in options:
         if name not in known:
             raise ConfigError(
                 f"reset has no option {name!r}; available: {', '.join(known)}. What belongs to the "
-                "model or the rules is given where the environment is made"
+                "model or the rules is given where the environment is made; a state is set after "
+                "the reset, by env.unwrapped.state = (…)"
             )
-    given = {"low": task.start_low, "high": task.start_high, **(options or {})}
-    low, high = (_finite(name, given[name]) for name in ("low", "high"))
+    low, high = (
+        _finite(each, options.get(each, usual[place])) for place, each in enumerate(known[:2])
+    )
     if low > high:
         raise ConfigError(f"low ({low}) is above high ({high}); the starting state lies between")
     _finite("the distance from low to high", high - low)

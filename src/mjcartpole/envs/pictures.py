@@ -1,6 +1,6 @@
 """What an environment draws with: a renderer, or a window, opened when it is first needed."""
 
-from typing import Any, Literal, get_args
+from typing import Any, Final, Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -18,7 +18,7 @@ from mjcartpole.task import Task
 
 RenderMode = Literal["human", "rgb_array"]
 
-_USUAL = (DEFAULT_WIDTH, DEFAULT_HEIGHT, DEFAULT_CAMERA)
+USUAL: Final = (DEFAULT_WIDTH, DEFAULT_HEIGHT, DEFAULT_CAMERA)
 
 
 class InNotebooks:
@@ -56,7 +56,7 @@ class Pictures:
             RenderError: The size of a picture makes no sense, or the model has no such camera.
         """
         _check_render_mode(mode, width, height)
-        if mode == "rgb_array" or (width, height, camera) != _USUAL:
+        if mode == "rgb_array" or (width, height, camera) != USUAL:
             check_picture(cartpole, width, height, camera)
         self._width, self._height, self._camera, self._task = width, height, camera, task
         self._renderer: Renderer | None = None
@@ -87,11 +87,11 @@ class Pictures:
         return self.__dict__ | {"_renderer": None, "_window": None}
 
 
-def warn_without_mode() -> None:
+def warn_without_mode(make: str = "gymnasium.make") -> None:
     """Say that there is nothing to render without a render mode, as gymnasium does."""
     logger.warn(
         "You are calling render method without specifying any render mode. "
-        f'Specify it when you make the env: gymnasium.make("{ENV_ID}", render_mode="rgb_array")'
+        f'Specify it when you make the env: {make}("{ENV_ID}", render_mode="rgb_array")'
     )
 
 

@@ -19,16 +19,14 @@ from mjcartpole.envs.options import added_of, rules_of, start_bounds
 from mjcartpole.envs.vector_pictures import VectorPictures, VectorRenderMode, check_render_mode
 from mjcartpole.errors import ConfigError, ResetNeededError
 from mjcartpole.integrator import Integrator
-from mjcartpole.media.renderer import DEFAULT_HEIGHT, DEFAULT_WIDTH, open_renderer
-from mjcartpole.media.scene import DEFAULT_CAMERA, check_picture
+from mjcartpole.media.renderer import DEFAULT_HEIGHT, DEFAULT_WIDTH
+from mjcartpole.media.scene import DEFAULT_CAMERA
 from mjcartpole.physics.batch_simulation import BatchSimulation
 from mjcartpole.physics.bodies import starting_state
 from mjcartpole.physics.load import Edits, ModelLike, load_model
 from mjcartpole.rewards import CONSTANT
 from mjcartpole.rules import Changes
 from mjcartpole.task import CARTPOLE_V1, Task, frame_rate, state_names, worst_pole
-
-_DEFAULT_PICTURE: Final = (DEFAULT_WIDTH, DEFAULT_HEIGHT, DEFAULT_CAMERA)
 
 _EVERYONE: Final = slice(None)
 _NOBODY: Final = np.empty(0, dtype=np.intp)
@@ -156,17 +154,18 @@ class CartPoleVectorEnv(
         self.max_episode_steps = _count("max_episode_steps", steps)
         threads = None if threads is None else _count("threads", threads)
         check_render_mode(render_mode)
-        self.render_mode = render_mode
         self.cartpole = load_model(model, edits, own_timestep=own_timestep)
         self._simulation = BatchSimulation(self.cartpole, self.num_envs, integrator, threads)
-        if render_mode is not None or (width, height, camera) != _DEFAULT_PICTURE:
-            check_picture(self.cartpole, width, height, camera)
+        self._prepare_pictures(render_mode, width, height, camera)
         self.metadata = self.metadata | {"render_fps": frame_rate(self.cartpole.control_step)}
+        self._make_spaces(added)
+        self._prepare_episodes()
+
+    def _make_spaces(self, added: Disturbances) -> None:
+        """Say what is seen, and what an action may be and comes to."""
+        controls = self.cartpole.controls
+        space = observation_space(self._task, self.cartpole.poles, self._observation)
         self._disturbers = None
-        controls, space = (
-            self.cartpole.controls,
-            observation_space(self._task, self.cartpole.poles, observation),
-        )
         if added.are_some:
             limited = self._task.with_changes(max_episode_steps=self.max_episode_steps)
             self._disturbers = Disturbers(added, self.cartpole, limited, self.num_envs)
@@ -178,10 +177,6 @@ class CartPoleVectorEnv(
         interpret = controls_of_pushes if self._task.continuous else controls_of_choices
         self._controls_of = functools.partial(
             interpret, space=self.action_space, controls=np.array(controls)
-        )
-        self._prepare_episodes()
-        self._open_renderer = functools.partial(
-            open_renderer, width=width, height=height, camera=camera, task=self._task
         )
 
     def _prepare_episodes(self) -> None:
@@ -249,8 +244,10 @@ class CartPoleVectorEnv(
             ConfigError: An option is unknown, or makes no sense.
             ResetNeededError: Some are to start before all have started once.
         """
-        bounds = start_bounds(self._task, options, "reset_mask")
-        who = self._mask((options or {}).get("reset_mask"))
+        given = {} if options is None else options
+        usual = self._task.start_low, self._task.start_high
+        bounds = start_bounds(given, usual, "reset_mask")
+        who = self._mask(given.get("reset_mask"))
         super().reset(seed=seed)
         self._bounds = bounds
         self._restart(who)

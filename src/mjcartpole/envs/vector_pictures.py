@@ -1,18 +1,19 @@
 """Pictures of many environments that move as one."""
 
-from collections.abc import Callable
+import functools
 from typing import Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
-from gymnasium import logger
 
 from mjcartpole.envs.disturbers import Disturbers
-from mjcartpole.envs.registration import ENV_ID
+from mjcartpole.envs.pictures import USUAL, warn_without_mode
 from mjcartpole.errors import ConfigError
-from mjcartpole.media.renderer import Renderer
+from mjcartpole.media.renderer import Renderer, open_renderer
+from mjcartpole.media.scene import check_picture
 from mjcartpole.physics.batch_simulation import BatchSimulation
 from mjcartpole.physics.cartpole import CartPole
+from mjcartpole.task import Task
 
 VectorRenderMode = Literal["rgb_array", "rgb_array_list"]
 
@@ -22,11 +23,20 @@ class VectorPictures:
 
     render_mode: str | None
     cartpole: CartPole
+    _task: Task
     _simulation: BatchSimulation
     _disturbers: Disturbers | None
     _has_state: bool
-    _open_renderer: Callable[[CartPole], Renderer]
     _renderer: Renderer | None = None
+
+    def _prepare_pictures(self, mode: str | None, width: int, height: int, camera: str) -> None:
+        """Check what was asked for; no OpenGL is touched."""
+        if mode is not None or (width, height, camera) != USUAL:
+            check_picture(self.cartpole, width, height, camera)
+        self.render_mode = mode
+        self._open_renderer = functools.partial(
+            open_renderer, width=width, height=height, camera=camera, task=self._task
+        )
 
     def render(self) -> tuple[npt.NDArray[np.uint8], ...] | None:
         """Draw the current states.
@@ -39,11 +49,7 @@ class VectorPictures:
             RenderError: No picture can be made.
         """
         if self.render_mode is None:
-            logger.warn(
-                "You are calling render method without specifying any render mode. "
-                f'Specify it when you make the env: gymnasium.make_vec("{ENV_ID}", '
-                'render_mode="rgb_array")'
-            )
+            warn_without_mode("gymnasium.make_vec")
             return None
         if not self._has_state:
             return None

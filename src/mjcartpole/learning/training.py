@@ -133,6 +133,8 @@ class Training:
         evaluations: The greedy evaluations so far.
     """
 
+    engine: Engine
+
     def __init__(
         self,
         config: TrainConfig,
@@ -156,8 +158,6 @@ class Training:
             ModelError: The model cannot be used.
         """
         check_engine(engine)
-        if env is not None and config.evaluation_period is not None:
-            raise ConfigError("evaluate_every and until are for the config's own environment")
         self.config = config
         if config.backend == "gym":
             cartpole = None
@@ -165,11 +165,6 @@ class Training:
             cartpole = config.load_model()
         self.discretizer = training_grid(config, cartpole, env)
         self.learner = Learner(config, self.discretizer)
-        if env is not None and self.learner.plans:
-            raise ConfigError(
-                f"method {config.method!r} needs equations, which an environment of one's own does "
-                "not show; take the config's own"
-            )
         self.log = EpisodeLog(config.episodes)
         self.evaluations: tuple[GreedyPoint, ...] = ()
         self._all_counted = True
@@ -177,19 +172,27 @@ class Training:
         self._env_rng, _ = seeding.np_random(config.seed)
         self._chance = Chance.of(self._env_rng) if config.disturbances.are_some else None
         self._seconds = 0.0
-        self.engine: Engine = "python"
-        if env is not None:
-            self._env = env
-            return
-        model = cartpole or config.model
-        self._physics = (
-            config.backend,
-            model,
-            config.integrator,
-            config.rules,
-            config.disturbances,
-        )
-        self.engine = choose_engine(engine, config.backend, cartpole, config.rules)
+        if env is None:
+            self._open(engine)
+        else:
+            self._take(env)
+
+    def _take(self, env: gymnasium.Env[Any, Any]) -> None:
+        """Train in an environment of one's own, which not everything can be done in."""
+        if self.config.evaluation_period is not None:
+            raise ConfigError("evaluate_every and until are for the config's own environment")
+        if self.learner.plans:
+            raise ConfigError(
+                f"method {self.config.method!r} needs equations, which an environment of one's own "
+                "does not show; take the config's own"
+            )
+        self.engine, self._env = "python", env
+
+    def _open(self, engine: Engine) -> None:
+        """Make what episodes are played in: a compiled loop, or an environment."""
+        config, model = self.config, self._cartpole or self.config.model
+        self._physics = config.backend, model, config.integrator, config.rules, config.disturbances
+        self.engine = choose_engine(engine, config.backend, self._cartpole, config.rules)
         if self.engine == "compiled":
             from mjcartpole.learning.compiled import CompiledLoop  # noqa: PLC0415 - it is heavy
 
