@@ -1,7 +1,7 @@
 """Who does the physics: our MuJoCo cart-pole or gymnasium's CartPole-v1, behind one interface."""
 
 from collections.abc import Collection
-from typing import TYPE_CHECKING, Any, Literal, Unpack, get_args
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Unpack, get_args
 
 import gymnasium
 
@@ -19,6 +19,16 @@ if TYPE_CHECKING:
 Backend = Literal["mujoco", "gym"]
 
 GYM_ID = "CartPole-v1"
+
+
+class World(NamedTuple):
+    """Where episodes are played, as `make_env` and the compiled loop take it; all of it checked."""
+
+    backend: Backend
+    model: "ModelLike"
+    integrator: Integrator
+    task: Task
+    disturbances: Disturbances
 
 
 def check_backend(

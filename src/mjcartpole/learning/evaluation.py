@@ -1,5 +1,6 @@
 """How good is a policy? Greedy episodes, counted."""
 
+import contextlib
 import html
 from collections import Counter
 from collections.abc import Callable
@@ -12,14 +13,14 @@ from gymnasium.utils import seeding
 
 from mjcartpole.disturbances.contexts import Chance
 from mjcartpole.disturbances.disturbances import NONE, Disturbances
-from mjcartpole.envs.backend import GYM_ID, Backend, check_backend, make_env
+from mjcartpole.envs.backend import GYM_ID, Backend, World, check_backend, make_env
 from mjcartpole.errors import ConfigError
 from mjcartpole.integrator import Integrator
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.controllers import Controller
 from mjcartpole.learning.engine import Engine, choose_engine
-from mjcartpole.learning.episodes import ENDINGS, Episode
-from mjcartpole.learning.loop import play_episode
+from mjcartpole.learning.episodes import ENDINGS, Episode, EpisodeLog
+from mjcartpole.learning.loop import lend, play_episode
 from mjcartpole.learning.naming import added_flags
 from mjcartpole.learning.policy import Policy
 from mjcartpole.task import CARTPOLE_V1, Task, resolve
@@ -135,35 +136,63 @@ def evaluate(
         ModelError: The model cannot be used.
         SimulationError: The physics diverged; names episode and step.
     """
-    check_count(episodes, seed)
     check_backend(backend, model, integrator, disturbances.vary)
-    rules = resolve(task)
-    if backend == "mujoco":
+    world = World(backend, model, integrator, resolve(task), disturbances)
+    return evaluate_in(world, policy, episodes, seed, engine)
+
+
+def evaluate_in(
+    world: World,
+    policy: PolicyLike,
+    episodes: int = EPISODES,
+    seed: int = SEED,
+    engine: Engine = "compiled",
+) -> Evaluation:
+    """Do what `evaluate` does; see there."""
+    check_count(episodes, seed)
+    poles, name = 1, GYM_ID
+    if world.backend == "mujoco":
         from mjcartpole.physics.load import load_model  # noqa: PLC0415 - it imports MuJoCo
 
-        model = load_model(model)
-        engine, poles, name = choose_engine(engine, backend, model, rules), model.poles, model.name
-    else:
-        engine, poles, name = choose_engine(engine, backend, task=rules), 1, GYM_ID
+        cartpole = load_model(world.model)
+        world, poles, name = world._replace(model=cartpole), cartpole.poles, cartpole.name
     if isinstance(policy, Policy | Controller):
         policy.check_fits(poles, name)
-        disturbances = disturbances.seen_by(policy.actions)
-    play = player(policy, rules)
+        world = world._replace(disturbances=world.disturbances.seen_by(policy.actions))
+    log = play_all(world, policy, episodes, seed, engine)
+    return Evaluation(world.backend, seed, tuple(log), world.disturbances)
+
+
+def play_all(
+    world: World,
+    policy: PolicyLike,
+    starts: int | npt.NDArray[np.float64],
+    seed: int,
+    engine: Engine = "compiled",
+) -> EpisodeLog:
+    """Play greedy episodes from so many starts that are drawn, or from given ones, one row each.
+
+    Raises:
+        ConfigError: There is no such engine, or the policy is a table and the task takes any push.
+        SimulationError: The physics diverged; names episode and step.
+    """
+    act = player(policy, world.task)
+    count, given = (starts, None) if isinstance(starts, int) else (len(starts), starts)
+    cartpole: Any = world.model if world.backend == "mujoco" else None
+    engine = choose_engine(engine, world.backend, cartpole, world.task)
+    rng, _ = seeding.np_random(seed)
+    chance = Chance.of(rng) if world.disturbances.are_some else None
     if engine == "compiled" and isinstance(policy, Policy):
         from mjcartpole.learning.compiled import CompiledLoop  # noqa: PLC0415 - it is heavy
 
-        rng, _ = seeding.np_random(seed)
-        chance = Chance.of(rng) if disturbances.are_some else None
-        loop = CompiledLoop(backend, model, integrator, rules, disturbances)
-        log = loop.play(policy, rng, episodes, chance)
-        return Evaluation(backend, seed, tuple(log), disturbances)
-    env = make_env(backend, model, integrator, rules, disturbances)
-    played = tuple(
-        play_episode(env, play, number=number, seed=seed if number == 0 else None)[0]
-        for number in range(episodes)
-    )
-    env.close()
-    return Evaluation(backend, seed, played, disturbances)
+        return CompiledLoop(*world).play(policy, rng if given is None else given, count, chance)
+    log = EpisodeLog(count)
+    with contextlib.closing(make_env(*world)) as env:
+        lend(env, rng, chance)
+        for number in range(count):
+            start = None if given is None else given[number].tolist()
+            log.append(play_episode(env, act, number=number, start=start)[0])
+    return log
 
 
 def player(policy: PolicyLike, task: Task) -> Callable[[npt.NDArray[np.float32]], Any]:
@@ -189,16 +218,14 @@ def evaluate_where_trained(
     Raises:
         SimulationError: The physics diverged.
     """
-    return evaluate(
-        policy,
-        backend=config.backend,
-        model=cartpole if cartpole is not None and config.backend == "mujoco" else "cartpole",
-        integrator=config.integrator,
-        task=config.rules,
-        disturbances=config.disturbances_after,
-        seed=seed,
-        engine=engine,
-    )
+    world = world_of(config, cartpole, config.disturbances_after)
+    return evaluate_in(world, policy, seed=seed, engine=engine)
+
+
+def world_of(config: TrainConfig, cartpole: "CartPole | None", added: Disturbances) -> World:
+    """Return where a config is played: its model is only for MuJoCo; with these disturbances."""
+    model = cartpole if cartpole is not None and config.backend == "mujoco" else "cartpole"
+    return World(config.backend, model, config.integrator, config.rules, added)
 
 
 def check_count(episodes: int, seed: int) -> None:

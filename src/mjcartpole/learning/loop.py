@@ -11,6 +11,7 @@ import gymnasium
 import numpy as np
 import numpy.typing as npt
 
+from mjcartpole.disturbances.contexts import Chance
 from mjcartpole.errors import SimulationError
 from mjcartpole.learning.discretizer import Discretizer, folded, row_of
 from mjcartpole.learning.episodes import ENDINGS, SIDES, Episode, ending_index, side_index
@@ -85,6 +86,15 @@ def _learn_episode(
     return _ended(env, number, total, len(actions), terminated)
 
 
+def lend(
+    env: gymnasium.Env[Any, Any], rng: np.random.Generator, chance: Chance | None, episode: int = 0
+) -> None:
+    """Let an environment draw from generators of one's own, from an episode on."""
+    env.unwrapped.np_random = rng
+    if chance and env.has_wrapper_attr("disturber"):
+        env.get_wrapper_attr("disturber").follow(rng, chance, episode)
+
+
 def in_episode(error: SimulationError, number: int, steps: int) -> SimulationError:
     """Return the same error with where it happened.
 
@@ -111,12 +121,12 @@ def play_episode(
         policy: From an observation, float32 of shape (4,), to an action.
         number: Number of the episode, for the record.
         seed: Seeds the environment if given.
-        start: Begins in this state instead of one that is drawn.
+        start: Begins in this state instead of one that is drawn, which nothing then seeds.
 
     Returns:
         The episode, and its states from the first to the last, each float64 of shape (4,).
     """
-    observation = env.reset(seed=seed)[0] if start is None else _begin_at(env, start, seed)
+    observation = env.reset(seed=seed)[0] if start is None else _begin_at(env, start)
     states = [_state_of(env)]
     total, over, terminated = 0.0, False, False
     try:
@@ -130,13 +140,11 @@ def play_episode(
     return _ended(env, number, total, len(states) - 1, terminated), states
 
 
-def _begin_at(
-    env: gymnasium.Env[Any, Any], start: Sequence[float], seed: int | None
-) -> npt.NDArray[np.float32]:
+def _begin_at(env: gymnasium.Env[Any, Any], start: Sequence[float]) -> npt.NDArray[np.float32]:
     """Begin an episode in a state; returns what is seen of it."""
     disturber = env.get_wrapper_attr("disturber") if env.has_wrapper_attr("disturber") else None
     with disturber.undrawn() if disturber else contextlib.nullcontext():
-        env.reset(seed=seed)
+        env.reset()
     env.unwrapped.state = np.array(start)  # type: ignore[attr-defined]
     seen = _state_of(env)
     if math.isinf(getattr(env.unwrapped, "theta_threshold_radians", 0.0)):

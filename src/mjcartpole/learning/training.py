@@ -18,10 +18,10 @@ from mjcartpole.learning.dream import Dream
 from mjcartpole.learning.dynamics import dynamics_of
 from mjcartpole.learning.engine import Engine, check_engine, choose_engine
 from mjcartpole.learning.episodes import Columns, EpisodeLog
-from mjcartpole.learning.evaluation import evaluate_where_trained
+from mjcartpole.learning.evaluation import evaluate_where_trained, world_of
 from mjcartpole.learning.greedy_curve import CURVE_SEED, GreedyPoint, first_reached
 from mjcartpole.learning.learner import Learner
-from mjcartpole.learning.loop import learn_episodes
+from mjcartpole.learning.loop import learn_episodes, lend
 from mjcartpole.learning.policy import Policy
 from mjcartpole.learning.training_grid import training_grid
 from mjcartpole.physics.cartpole import CartPole
@@ -190,15 +190,15 @@ class Training:
 
     def _open(self, engine: Engine) -> None:
         """Make what episodes are played in: a compiled loop, or an environment."""
-        config, model = self.config, self._cartpole or self.config.model
-        self._physics = config.backend, model, config.integrator, config.rules, config.disturbances
+        config = self.config
+        self._world = world_of(config, self._cartpole, config.disturbances)
         self.engine = choose_engine(engine, config.backend, self._cartpole, config.rules)
         if self.engine == "compiled":
             from mjcartpole.learning.compiled import CompiledLoop  # noqa: PLC0415 - it is heavy
 
-            self._loop = CompiledLoop(*self._physics)
+            self._loop = CompiledLoop(*self._world)
         else:
-            self._env = make_env(*self._physics)
+            self._env = make_env(*self._world)
 
     def run(self) -> Iterator[int]:
         """Train to the end; the clock runs neither while the loop is compiled nor in evaluations.
@@ -232,13 +232,13 @@ class Training:
         if not self.learner.dreams:
             return
         started = time.perf_counter()
-        world = self._env if self.engine == "python" else make_env(*self._physics)
-        self._lend(world)
+        world = self._env if self.engine == "python" else make_env(*self._world)
+        lend(world, self._env_rng, self._chance)
         cartpole, rules = self._cartpole, self.config.rules
         fitted = self.learner.imagine(world, cartpole.control_step if cartpole else CONTROL_STEP)
         world.close()
         if self.engine == "compiled":
-            self._loop = type(self._loop)(*self._physics, fitted=fitted)
+            self._loop = type(self._loop)(*self._world, fitted=fitted)
         else:
             self._env = Dream(fitted, rules)
         self._seconds += time.perf_counter() - started
@@ -286,14 +286,8 @@ class Training:
             self.learner, self.discretizer, self._env_rng, self.log, numbers, self._chance
         )
 
-    def _lend(self, env: gymnasium.Env[Any, Any], episode: int = 0) -> None:
-        """Let an environment draw from the training's own generators."""
-        env.unwrapped.np_random = self._env_rng
-        if self._chance and env.has_wrapper_attr("disturber"):
-            env.get_wrapper_attr("disturber").follow(self._env_rng, self._chance, episode)
-
     def _run_python(self, numbers: range) -> Iterator[int]:
-        self._lend(self._env, numbers.start)
+        lend(self._env, self._env_rng, self._chance, numbers.start)
         for episode in learn_episodes(self._env, self.learner, self.discretizer, numbers):
             self.log.append(episode)
             yield len(self.log)

@@ -1,20 +1,16 @@
 """From which starts does a policy last? Greedy episodes from a grid of starting states, at once."""
 
-import contextlib
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Final
 
 import numpy as np
 import numpy.typing as npt
-from gymnasium.utils import seeding
 
-from mjcartpole.disturbances.contexts import Chance
-from mjcartpole.envs.backend import make_env
 from mjcartpole.errors import ConfigError
 from mjcartpole.learning.config import POOL
-from mjcartpole.learning.engine import Engine, choose_engine
-from mjcartpole.learning.loop import play_episode
+from mjcartpole.learning.engine import Engine
+from mjcartpole.learning.evaluation import play_all
 from mjcartpole.learning.slices import Axes, check_of_state, choose_axes, names_of, states_over
 from mjcartpole.media.grid_plot import Field, Grid
 from mjcartpole.studies.policy_setup import PolicySetup
@@ -97,28 +93,10 @@ def survival(
 ) -> npt.NDArray[np.int64]:
     """Return after how many steps greedy episodes end, shape (n,); at most the time limit.
 
-    Args:
-        setup: The policy and where it is played.
-        starts: Starting states, shape (n, 2 + 2 poles).
-        engine: Who runs the loop; where the compiled one cannot run, the other does.
+    Starting states have the shape (n, 2 + 2 poles).
 
     Raises:
         SimulationError: The physics diverged; names episode and step.
     """
-    cartpole = setup.cartpole if setup.backend == "mujoco" else None
-    rng, _ = seeding.np_random(setup.seed)
-    chance = Chance.of(rng) if setup.disturbances.are_some else None
-    if choose_engine(engine, setup.backend, cartpole, setup.task) == "compiled":
-        from mjcartpole.learning.compiled import CompiledLoop  # noqa: PLC0415 - it is heavy
-
-        log = CompiledLoop(*setup.world).play(setup.table, starts, len(starts), chance)
-        return log.columns.steps.astype(np.int64)
-    with contextlib.closing(make_env(*setup.world)) as env:
-        if chance:
-            env.unwrapped.np_random = rng
-            env.get_wrapper_attr("disturber").follow(rng, chance)
-        played = [
-            play_episode(env, setup.table, number=number, start=start)[0].steps
-            for number, start in enumerate(starts.tolist())
-        ]
-    return np.array(played, np.int64)
+    log = play_all(setup.world, setup.table, starts, setup.seed, engine)
+    return log.columns.steps.astype(np.int64)

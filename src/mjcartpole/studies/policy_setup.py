@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Final
 
 from mjcartpole.disturbances.disturbances import NONE, Disturbances
-from mjcartpole.envs.backend import Backend, check_backend
+from mjcartpole.envs.backend import Backend, World, check_backend
 from mjcartpole.errors import ConfigError
 from mjcartpole.files import is_file
 from mjcartpole.integrator import Integrator
@@ -58,9 +58,10 @@ class PolicySetup:
         return load_model(self.model)
 
     @property
-    def world(self) -> tuple[Backend, ModelLike, Integrator, Task, Disturbances]:
-        """Where it is played, as both engines take it."""
-        return self.backend, self.model, self.integrator, self.task, self.disturbances
+    def world(self) -> World:
+        """Where it is played."""
+        model = self.cartpole if self.backend == "mujoco" else self.model
+        return World(self.backend, model, self.integrator, self.task, self.disturbances)
 
     @property
     def notes(self) -> list[str]:
@@ -70,16 +71,7 @@ class PolicySetup:
 
     def evaluate(self, episodes: int) -> Evaluation:
         """Play greedy episodes; see `mjcartpole.evaluate`."""
-        return evaluation.evaluate(
-            self.policy,
-            backend=self.backend,
-            model=self.model,
-            integrator=self.integrator,
-            task=self.task,
-            disturbances=self.disturbances,
-            episodes=episodes,
-            seed=self.seed,
-        )
+        return evaluation.evaluate_in(self.world, self.policy, episodes, self.seed)
 
     @property
     def table(self) -> Policy:
@@ -121,10 +113,8 @@ def where_trained(
     name: str, policy: Policy, config: TrainConfig, cartpole: CartPole
 ) -> PolicySetup:
     """Return a policy where it was trained, on the model that the config names."""
-    disturbances = config.disturbances_after.seen_by(policy.actions)
-    model: ModelLike = cartpole if config.backend == "mujoco" else "cartpole"
-    world = config.backend, model, config.integrator
-    return PolicySetup(name, policy, *world, task=config.rules, disturbances=disturbances)
+    added = config.disturbances_after.seen_by(policy.actions)
+    return PolicySetup(name, policy, **evaluation.world_of(config, cartpole, added)._asdict())
 
 
 def _placed(

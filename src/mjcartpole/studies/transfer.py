@@ -10,10 +10,17 @@ import numpy.typing as npt
 
 from mjcartpole.cores import worker_count
 from mjcartpole.disturbances.disturbances import NONE, Disturbances
-from mjcartpole.envs.backend import Backend
+from mjcartpole.envs.backend import Backend, World
 from mjcartpole.errors import ConfigError, MjCartPoleError
 from mjcartpole.integrator import Integrator
-from mjcartpole.learning.evaluation import EPISODES, SEED, Evaluation, Player, check_count, evaluate
+from mjcartpole.learning.evaluation import (
+    EPISODES,
+    SEED,
+    Evaluation,
+    Player,
+    check_count,
+    evaluate_in,
+)
 from mjcartpole.learning.naming import added_flags
 from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.edit.edits import edits_of
@@ -51,6 +58,11 @@ class Place:
     def poles(self) -> int:
         """How many there are."""
         return 1 if self.cartpole is None else self.cartpole.poles
+
+    def world(self, task: Task) -> World:
+        """Return the same as what plays there by a task's rules takes it."""
+        model = self.cartpole or "cartpole"
+        return World(self.backend, model, self.integrator, task, self.disturbances)
 
     def check_disturbances(self, task: Task) -> None:
         """Refuse disturbances that make no sense here by these rules (ConfigError)."""
@@ -254,19 +266,7 @@ def _play(
     name: str, policies: Sequence[Player], place: Place, rules: Task, episodes: int, seed: int
 ) -> Cell:
     try:
-        played = [
-            evaluate(
-                policy,
-                backend=place.backend,
-                model=place.cartpole or "cartpole",
-                integrator=place.integrator,
-                task=rules,
-                disturbances=place.disturbances,
-                episodes=episodes,
-                seed=seed,
-            )
-            for policy in policies
-        ]
+        played = [evaluate_in(place.world(rules), policy, episodes, seed) for policy in policies]
     except MjCartPoleError as error:
         # One model that diverges is no reason to lose the others.
         return Cell(name, place.name, error=str(error))

@@ -15,9 +15,8 @@ from typing import BinaryIO, Final, Self
 from mjcartpole.disturbances.disturbances import Disturbances
 from mjcartpole.errors import FileError, MjCartPoleError
 from mjcartpole.files import brief, is_there, opened, sync
-from mjcartpole.learning.evaluation import Evaluation, evaluate
+from mjcartpole.learning.evaluation import evaluate_in, world_of
 from mjcartpole.learning.stored import Fields, checked, parse
-from mjcartpole.learning.training import TrainResult
 from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.studies.multi_seed import OUT_OF_MEMORY, SeedJob, model_of, train_seed
 from mjcartpole.studies.side_by_side import Stop
@@ -121,7 +120,10 @@ def do_run(
         lasting = found.error and found.error != OUT_OF_MEMORY
         return _failed(key, found.error) if lasting else None
     try:
-        disturbed = _disturbed(result, job, tested, cartpole) if tested else None
+        disturbed = None
+        if tested:
+            world = world_of(job.config, cartpole or model_of(job), tested)
+            disturbed = evaluate_in(world, result.policy, engine=job.engine)
     except MjCartPoleError as error:
         return _failed(key, str(error))
     outcome = Outcome(result, found.evaluation, disturbed)
@@ -138,21 +140,6 @@ def do_run(
         ],
         times=figures_of(outcome, apart=True),
         host=socket.gethostname(),
-    )
-
-
-def _disturbed(
-    result: TrainResult, job: SeedJob, tested: Disturbances, cartpole: CartPole | None
-) -> Evaluation:
-    config = job.config
-    return evaluate(
-        result.policy,
-        backend=config.backend,
-        model="cartpole" if job.document is None else cartpole or model_of(job),
-        integrator=config.integrator,
-        task=config.rules,
-        disturbances=tested,
-        engine=job.engine,
     )
 
 
