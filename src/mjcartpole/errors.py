@@ -119,7 +119,12 @@ def nearest(name: object, available: Iterable[object]) -> list[str]:
 
     >>> nearest("n-step", ("sarsa", "n-step-sarsa"))
     ['n-step-sarsa']
+    >>> nearest("dealy", ("decay", "delay"))
+    ['delay', 'decay']
     """
     names = [str(each) for each in available]
     meant = name if isinstance(name, str) else ""
-    return difflib.get_close_matches(meant, names, n=max(1, len(names)))
+    close = difflib.get_close_matches(meant, names, n=max(1, len(names)))
+    # Two letters the wrong way round are one slip, which difflib counts as two.
+    turned = {f"{meant[:i]}{meant[i : i + 2][::-1]}{meant[i + 2 :]}" for i in range(len(meant))}
+    return sorted(close, key=lambda each: each not in turned)

@@ -2,6 +2,7 @@
 
 import contextlib
 import io
+import re
 from collections.abc import Sequence
 
 import tyro
@@ -9,6 +10,7 @@ import tyro
 from mjcartpole.commands.options import Command, UsageError
 from mjcartpole.commands.registry import COMMANDS, grammar, name_of
 from mjcartpole.commands.words import LISTS, rewritten
+from mjcartpole.errors import check_known, nearest
 
 
 def parse(argv: Sequence[str]) -> Command:
@@ -38,23 +40,37 @@ def parse(argv: Sequence[str]) -> Command:
 
 
 def _explained(words: list[str], complaint: str) -> str:
-    """Return in one line why a command line was not understood, and where help is."""
-    named = [command for command in COMMANDS if name_of(command) == words[0]]
-    for command in named:
-        if said := command.explain(words):
-            return said
-    return f"{_one_line(complaint)}; see mjcartpole {f'{words[0]} ' if named else ''}--help"
+    """Return in one line why a command line was not understood, and where help is.
+
+    Raises:
+        UsageError: It names no command that there is.
+    """
+    named = {name_of(command): command for command in COMMANDS}
+    if not words[0].startswith("-"):
+        check_known("command", words[0], named, UsageError)
+    if words[0] in named and (said := named[words[0]].explain(words)):
+        return said
+    name = words[0] if words[0] in named else ""
+    return f"{_one_line(complaint, name)}; see mjcartpole {f'{name} ' if name else ''}--help"
 
 
-def _one_line(complaint: str) -> str:
-    """Return a tyro error box as one line: its message, and what it thinks was meant.
+def _one_line(complaint: str, command: str) -> str:
+    """Return a tyro error box as one line: its message, and which flag of a command was meant.
 
-    The first line is a title; rules of dashes separate the message from what follows.
+    The first line is a title; rules of dashes separate the message from what follows: flags, each
+    with its help and the commands that have it.
     """
     lines = [line.strip("│╭╮╰╯ ") for line in complaint.splitlines()[1:]]
     text = "\n".join("" if set(line) <= {"─", "-"} else line for line in lines)
-    message, *others = [block.splitlines() for block in text.strip().split("\n\n")]
-    for block in others:
-        if block[0].startswith("Perhaps you meant") and len(block) > 1:
-            return f"{' '.join(message)}; perhaps you meant {block[1]}"
-    return " ".join(message).rstrip(".")
+    message, *_ = text.strip().split("\n\n")
+    said = message.replace("\n", " ").rstrip(".")
+    similar = re.findall(r"^\W{2,}(--\S+)(.*)((?:\n(?!\W{2,}--).*)*)", complaint, re.MULTILINE)
+    flags = {
+        flag: f"{flag}{takes.rstrip(' │')}"
+        for flag, takes, told in similar
+        if f"in mjcartpole {command} --help" in told
+    }
+    asked = re.search(r"--[\w-]+", said)
+    return said + "".join(
+        f"; perhaps you meant {flags[near]}" for near in nearest(asked and asked[0], flags)[:1]
+    )
