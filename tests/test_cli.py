@@ -197,6 +197,19 @@ def test_only_a_process_of_its_own_looks_for_garbage_seldom(here):
 
 
 @pytest.mark.slow
+def test_only_in_a_process_of_its_own_steps_take_no_time_of_themselves(here):
+    code = (
+        "import mujoco; from mjcartpole.cli import main\ntry: {}\nexcept SystemExit: pass\n"
+        "data = mujoco.MjData(model := mujoco.MjModel.from_xml_string('<mujoco/>'))\n"
+        "mujoco.mj_step(model, data, nstep=100); print(data.timer[0].duration > 0)"
+    )
+    for words, expected in (("main()", "False"), ("main(['model', 'list'])", "True")):
+        command = [sys.executable, "-c", code.format(words), "model", "list"]
+        done = subprocess.run(command, capture_output=True, text=True, check=True)
+        assert done.stdout.splitlines()[-1] == expected
+
+
+@pytest.mark.slow
 def test_a_reader_that_leaves_early_is_no_error(here):
     process = start(["train", *QUICK], here)
     process.stdout.close()

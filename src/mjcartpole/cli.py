@@ -24,10 +24,11 @@ INTERRUPTED = 130
 
 def main(argv: Sequence[str] | None = None) -> NoReturn:
     """Run a command and exit with its code."""
-    if argv is None:  # The process is this command's own.
+    is_own = argv is None  # The process is this command's own.
+    if is_own:
         _collect_rarely()
     with patient_output():
-        code = _exit_code(list(sys.argv[1:] if argv is None else argv))
+        code = _exit_code(list(sys.argv[1:] if argv is None else argv), is_own)
         problem = stdout_problem()
         if problem is not None and not has_left(problem):
             reason = problem.strerror or problem
@@ -42,9 +43,9 @@ def _collect_rarely() -> None:
     atexit.register(gc.freeze)
 
 
-def _exit_code(argv: list[str]) -> int:
+def _exit_code(argv: list[str], is_own: bool) -> int:
     try:
-        return _run(argv)
+        return _run(argv, is_own)
     except SystemExit as stop:  # After --help.
         return int(stop.code or 0)
     except MjCartPoleError as error:
@@ -60,7 +61,7 @@ def _complain(message: str) -> None:
     print(f"{ERASE if sys.stderr.isatty() else ''}mjcartpole: {message}", file=sys.stderr)
 
 
-def _run(argv: list[str]) -> int:
+def _run(argv: list[str], is_own: bool) -> int:
     if argv in (["--version"], ["-V"]):
         print(f"mjcartpole {__version__}")
         return 0
@@ -69,12 +70,15 @@ def _run(argv: list[str]) -> int:
 
     command = parse(argv or ["--help"])
     _report_to_stderr()
-    _import_mujoco()
+    _import_mujoco(is_own)
     return command.run()
 
 
-def _import_mujoco() -> None:
+def _import_mujoco(is_own: bool) -> None:
     """Import what each command needs; MuJoCo's modules lose an interrupt that comes meanwhile.
+
+    Args:
+        is_own: Whether MuJoCo has nobody else here to measure its steps for.
 
     Raises:
         Interrupted: One came.
@@ -84,7 +88,8 @@ def _import_mujoco() -> None:
         from mjcartpole.commands import policies  # noqa: F401, PLC0415 - not for --help
         from mjcartpole.physics.library import stop_timers  # noqa: PLC0415
 
-        stop_timers()
+        if is_own:
+            stop_timers()
     if signals.stop():
         raise Interrupted(number=signals.number)
 
