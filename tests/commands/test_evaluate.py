@@ -35,6 +35,7 @@ def run(tmp_path_factory):
         (["--undisturbed"], None),
         (["--undisturbed", "--push", "1@1s"], "--push 1@1s"),
         (["--backend", "gym"], "--delay 1 --noise 0.01"),
+        (["--backend", "gym", "--vary", "none"], "--delay 1 --noise 0.01"),
     ],
 )
 def test_a_run_is_played_as_it_was_trained_but_for_what_is_given(run, flags, added, capsys):
@@ -44,6 +45,22 @@ def test_a_run_is_played_as_it_was_trained_but_for_what_is_given(run, flags, add
     code, out, _ = call(["evaluate", run, "--episodes", "3", *flags], capsys)
     assert ("with" in out) == bool(added)
     assert (added or "") in out
+
+
+@pytest.mark.parametrize(
+    ("flags", "told"),
+    [
+        (
+            [],
+            "mjcartpole: gymnasium's cart-pole does not vary: --vary pole.length=0.5:1.5 is left ",
+        ),
+        (["--vary", "none"], ""),
+        (["--undisturbed"], ""),
+    ],
+)
+def test_what_gymnasium_leaves_out_of_a_training_is_told(run, flags, told, capsys):
+    code, _, err = call(["evaluate", run, "--episodes", "3", "--backend", "gym", *flags], capsys)
+    assert (code, err.startswith(told), err.count("\n")) == (0, True, bool(told))
 
 
 @pytest.mark.long

@@ -57,15 +57,16 @@ class Evaluate(Command):
         return 0
 
     def _run_seeds(self, source: Path) -> int:
-        from mjcartpole.commands.policies import learned_seeds, set_up
+        from mjcartpole.commands.policies import learned_seeds, set_up_all
         from mjcartpole.learning.documents import read_config
         from mjcartpole.studies.seeds import ManyResult, SeedResult
 
         learned = learned_seeds(source)
-        setups = {seed: set_up(run, self.target) for seed, run in learned.items()}
-        found = [SeedResult(seed, setup.evaluate(self.episodes)) for seed, setup in setups.items()]
+        setups = set_up_all(learned.values(), self.target)
+        pairs = zip(learned, setups, strict=True)
+        found = [SeedResult(seed, setup.evaluate(self.episodes)) for seed, setup in pairs]
         config = read_config(next(iter(learned.values())))[2]
-        self._print_many(ManyResult(config, tuple(found)), next(iter(setups.values())))
+        self._print_many(ManyResult(config, tuple(found)), setups[0])
         return 0
 
     def _print_many(self, many: "ManyResult", first: "PolicySetup") -> None:

@@ -34,7 +34,7 @@ class Page(Command):
 
     def run(self) -> int:
         """Play an episode of each, and write the page; all is checked before anything is played."""
-        from mjcartpole.commands.policies import set_up, shown
+        from mjcartpole.commands.policies import set_up_all, shown
         from mjcartpole.media.plots import MISSING_LIBRARY, is_installed
         from mjcartpole.page.document import check_built, page_html
         from mjcartpole.page.run_data import check_shown
@@ -52,7 +52,7 @@ class Page(Command):
         if self.plots and not plots:
             print(f"mjcartpole: no plots: {MISSING_LIBRARY}", file=sys.stderr)
         sources = [shown(source) for source in self.sources]
-        setups = [set_up(source, self.target) for source in sources]
+        setups = set_up_all(sources, self.target)
         for setup in setups:
             check_shown(setup)
         path = self.output or Path(f"{setups[0].name}.html")

@@ -1,6 +1,7 @@
 """How commands find a policy, and where to play it."""
 
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 
 from mjcartpole.commands.printing import counted
@@ -14,13 +15,28 @@ from mjcartpole.studies.policy_setup import PolicySetup, controller_setup, find_
 
 
 def set_up(source: Path, target: EvalTarget) -> PolicySetup:
-    """Find a policy, and where to play it; see `find_setup`. MuJoCo's own warnings are silenced.
+    """Find a policy, and where to play it; see `set_up_all`.
+
+    Raises:
+        MjCartPoleError: Something cannot be used.
+    """
+    return set_up_all([source], target)[0]
+
+
+def set_up_all(sources: Iterable[Path], target: EvalTarget) -> list[PolicySetup]:
+    """Find policies, and where to play each; see `find_setup`. MuJoCo's own warnings are silenced.
+
+    What gymnasium's cart-pole leaves out of a training is told.
 
     Raises:
         MjCartPoleError: Something cannot be used.
     """
     silence_mujoco()
-    return find_setup(source, target)
+    setups = [find_setup(source, target) for source in sources]
+    for ranges in dict.fromkeys(setup.left_out for setup in setups if setup.left_out):
+        told = f"gymnasium's cart-pole does not vary: --vary {' '.join(ranges)} is left out"
+        print(f"mjcartpole: {told}", file=sys.stderr)
+    return setups
 
 
 def set_up_controller(name: str, target: EvalTarget) -> PolicySetup:

@@ -40,7 +40,7 @@ class Render(Command):
     def run(self) -> int:
         """Play, and film it; all is checked before anything is played."""
         from mjcartpole.commands.films import default_path, film, write_sheet
-        from mjcartpole.commands.policies import set_up, set_up_controller, shown
+        from mjcartpole.commands.policies import set_up_all, set_up_controller, shown
         from mjcartpole.studies.film import play
 
         if not (self.sources or self.policy):
@@ -50,7 +50,7 @@ class Render(Command):
             )
         signals = StopSignals()
         with signals.caught():
-            setups = [set_up(shown(source), self.target) for source in self.sources]
+            setups = set_up_all(map(shown, self.sources), self.target)
             setups += [set_up_controller(name, self.target) for name in self.policy]
             suffix = ".png" if self.sheet else ".mp4"
             path = self.output or default_path(setups, suffix, self.overwrite)

@@ -41,6 +41,7 @@ class PolicySetup:
         seed: Seeds the first episode's starting state.
         task: The rules.
         disturbances: What is added.
+        left_out: What varied in training and does not here, since gymnasium's cart-pole cannot.
     """
 
     name: str
@@ -51,6 +52,7 @@ class PolicySetup:
     seed: int = SEED
     task: Task = CARTPOLE_V1
     disturbances: Disturbances = NONE
+    left_out: tuple[str, ...] = ()
 
     @functools.cached_property
     def cartpole(self) -> CartPole:
@@ -127,7 +129,9 @@ def _placed(
     seed = evaluation.SEED if target.seed is None else target.seed
     evaluation.check_count(1, seed)
     backend = target.backend or config.backend
-    disturbances = _disturbances(config, target, backend).seen_by(policy.actions)
+    own = NONE if target.undisturbed else config.disturbances_after
+    left_out = own.vary if backend == "gym" and not target.vary else ()
+    disturbances = target.added_to(own.fixed if backend == "gym" else own).seen_by(policy.actions)
     disturbances.check_apart(edits_of(target.set))
     own_model = str(run.model) if run else config.model
     if backend == "gym":
@@ -135,7 +139,7 @@ def _placed(
         own_model = "cartpole"
         config = TrainConfig(backend="gym", task=config.rules)
     model, integrator = target.model or own_model, target.integrator or config.integrator
-    asked = *target.set, *target.vary
+    asked = *target.set, *disturbances.vary
     check_backend(backend, model, integrator, asked, own_timestep=target.own_timestep)
     own_timestep = config.own_timestep or target.own_timestep
     played_on: ModelLike = model
@@ -143,14 +147,8 @@ def _placed(
         played_on = run.cartpole(target.allow_assets, own_timestep=own_timestep)
     if target.set or (own_timestep and played_on == model):
         played_on = load_model(played_on, target.set, own_timestep=own_timestep)
-    rules = target.applied_to(config.rules)
-    return PolicySetup(name, policy, backend, played_on, integrator, seed, rules, disturbances)
-
-
-def _disturbances(config: TrainConfig, target: EvalTarget, backend: Backend) -> Disturbances:
-    """Return what is added: the run's own, but for what is asked for."""
-    own = NONE if target.undisturbed else config.disturbances_after
-    return target.added_to(own.fixed if backend == "gym" else own)
+    world = backend, played_on, integrator, seed, target.applied_to(config.rules)
+    return PolicySetup(name, policy, *world, disturbances, left_out)
 
 
 def _read(source: Path, target: EvalTarget) -> tuple[str, Policy, TrainConfig, runs.Run | None]:
