@@ -145,6 +145,8 @@ def test_some_rules_are_others():
         ({"start_low": 0.06}, r"start_low \(0\.06\) is above start_high \(0\.05\)"),
         ({"start_angle": 3.1}, r"between theta = 3\.05 and 3\.15 rad, all beyond theta_limit"),
         ({"start_high": 9, "start_low": 3}, r"between x = 3 and 9 m, all beyond x_limit, 2\.4"),
+        ({"x_limit": 1e-9}, r"-0\.05 and 0\.05 m, nearly all beyond x_limit, 1e-09"),
+        ({"theta_limit": 4e-4}, "rad, nearly all beyond theta_limit"),
     ],
 )
 def test_changes_that_make_no_sense_are_told_in_one_line(changes, message):

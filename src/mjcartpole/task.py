@@ -23,6 +23,9 @@ CONTROL_STEP: Final = 0.02
 
 _TURN: Final = 2 * math.pi
 
+_FEWEST_STARTS: Final = 0.01
+"""Of all starts, within each limit: the others are over before they have begun."""
+
 Number = TypeVar("Number", float, npt.NDArray[np.float64])
 """One, or many."""
 
@@ -170,10 +173,11 @@ class Task:
         for name, middle in ("x", 0.0), ("theta", self.start_angle):
             low, high = middle + self.start_low, middle + self.start_high
             limit = getattr(self, f"{name}_limit")
-            if max(low, -high) > limit:
-                unit = "m" if name == "x" else "rad"
+            within = min(high, limit) - max(low, -limit)
+            if within < _FEWEST_STARTS * (high - low) or within < 0:
+                unit, share = "m" if name == "x" else "rad", "all" if within < 0 else "nearly all"
                 raise ConfigError(
-                    f"episodes start between {name} = {low:g} and {high:g} {unit}, all beyond "
+                    f"episodes start between {name} = {low:g} and {high:g} {unit}, {share} beyond "
                     f"{name}_limit, {limit:g}: change start_low, start_high or start_angle, or "
                     f"make {name}_limit larger (inf: none)"
                 )
