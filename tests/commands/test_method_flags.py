@@ -30,7 +30,7 @@ TILED = ", ".join(each for each in METHODS if "tilings" in flags_of(each))
         ),
         ("--method planning --no-learn-last-step", "'planning' has no option --learn-last-step ("),
         ("--epsilom .5", "--epsilom; its options are --epsilon, --epsilon-final, --gamma, "),
-        ("--resume run --sweeps 3", "--resume continues a run as it began: leave out what only"),
+        ("--resume run --sweeps 3", "--resume continues a run as it began: leave out --sweeps"),
         ("--method n-step", "'n-step' is unknown; available: q-learning, sarsa, expected-sarsa, "),
         ("--method n-step", "; did you mean 'n-step-sarsa'?"),
     ],

@@ -3,7 +3,7 @@
 import dataclasses
 import re
 from collections.abc import Iterable, Sequence
-from typing import Final
+from typing import Any, Final
 
 from mjcartpole.errors import nearest
 from mjcartpole.learning.methods import METHODS
@@ -22,7 +22,7 @@ def lacking(words: Sequence[str], method: str, others: Iterable[str]) -> str | N
     Returns:
         None where no word looks like an option that some method has.
     """
-    its, of_none = flags_of(method), [name.replace("_", "-") for name in others]
+    its, of_none = flags_of(method), list(others)
     of_any = [flag for each in METHODS for flag in flags_of(each)]
     for flag in given(words):
         if flag in its or not (near := nearest(flag, [*of_none, *of_any])) or near[0] in of_none:
@@ -40,9 +40,12 @@ def lacking(words: Sequence[str], method: str, others: Iterable[str]) -> str | N
 
 def flags_of(method: str) -> list[str]:
     """Return the flags that are a method's own, without their dashes."""
-    return [
-        field.name.replace("_", "-") for field in dataclasses.fields(METHODS[method].Parameters)
-    ]
+    return fields_of(METHODS[method].Parameters)
+
+
+def fields_of(group: Any) -> list[str]:  # noqa: ANN401 - any dataclass
+    """Return the flags that a dataclass makes, without their dashes."""
+    return [field.name.replace("_", "-") for field in dataclasses.fields(group)]
 
 
 def given(words: Sequence[str]) -> list[str]:

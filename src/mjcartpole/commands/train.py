@@ -1,18 +1,18 @@
 """`mjcartpole train`."""
 
-import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Self
+from typing import Final, Self
 
-from mjcartpole.commands.method_flags import lacking
+from mjcartpole.commands.method_flags import fields_of, flags_of, given, lacking
 from mjcartpole.commands.options import Command, Included
 from mjcartpole.commands.train_options import RunLocation, TrainOptions
 from mjcartpole.commands.words import value_of
 from mjcartpole.disturbances.disturbances import Disturbances
 from mjcartpole.errors import ConfigError
 from mjcartpole.learning.config import TrainConfig
+from mjcartpole.learning.methods import METHODS
 
 
 @dataclass(frozen=True)
@@ -30,6 +30,8 @@ class Train(Command):
     @classmethod
     def default(cls, words: Sequence[str]) -> Self:
         """Return the defaults of the preset and the method that the words name."""
+        if value_of("--resume", words, "None") != "None":
+            _check_only_resumed(words)
         preset = value_of("--preset", words, RunLocation.preset)
         method = value_of("--method", words, TrainConfig.preset(preset).method)
         return cls(RunLocation(preset), config=TrainConfig.preset(preset, method=method))
@@ -37,12 +39,8 @@ class Train(Command):
     @classmethod
     def explain(cls, words: Sequence[str]) -> str | None:
         """Return which option the method lacks, and what it has."""
-        groups = (cls, RunLocation, TrainOptions, TrainConfig, Disturbances)
-        others = [each.name for group in groups for each in dataclasses.fields(group)]
-        said = lacking(words, cls.default(words).config.method, others)
-        if said and value_of("--resume", words, ""):
-            return f"--resume continues a run as it began: leave out what only trains; {said}"
-        return said
+        others = ["resume", *_DECISIVE, *fields_of(TrainOptions)]
+        return lacking(words, cls.default(words).config.method, others)
 
     def run(self) -> int:
         """Train one seed, many of them, or go on with either."""
@@ -52,8 +50,6 @@ class Train(Command):
 
         if self.how.allow_assets and self.resume is None:
             raise ConfigError("--allow-assets is for --resume; a new run's model may name any file")
-        if self.resume is not None:
-            self._check_only_resumed()
         if self.resume is not None and SEEDS in content_of(self.resume):
             return train_seeds.resume(self.resume, self.how)
         if self.seeds != 1:
@@ -64,17 +60,16 @@ class Train(Command):
             return train_one.resume(self.resume, self.how)
         return train_one.train(self.config, self.how, self.where)
 
-    def _check_only_resumed(self) -> None:
-        """Refuse flags that would be ignored: a training that is resumed keeps its config."""
-        usual = TrainConfig.preset(self.where.preset, method=self.config.method).values()
-        usual["method"] = TrainConfig.preset(self.where.preset).method
-        given = [name for name, value in self.config.values().items() if value != usual[name]]
-        given += [
-            each.name
-            for each in dataclasses.fields(RunLocation)
-            if getattr(self.where, each.name) != each.default
-        ]
-        given += ["seeds"] if self.seeds != 1 else []
-        if given:
-            flags = ", ".join(f"--{name.replace('_', '-')}" for name in given)
-            raise ConfigError(f"--resume continues a run as it began: leave out {flags}")
+
+_DECISIVE: Final = [
+    "seeds",
+    *(flag for group in (RunLocation, TrainConfig, Disturbances) for flag in fields_of(group)),
+]
+"""Flags of a new training, besides those of its method."""
+
+
+def _check_only_resumed(words: Sequence[str]) -> None:
+    """Refuse flags that would be ignored: a training that is resumed keeps its config."""
+    decisive = {*_DECISIVE, *(flag for method in METHODS for flag in flags_of(method))}
+    if asked := [f"--{flag}" for flag in dict.fromkeys(given(words)) if flag in decisive]:
+        raise ConfigError(f"--resume continues a run as it began: leave out {', '.join(asked)}")
