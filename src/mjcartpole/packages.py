@@ -23,14 +23,10 @@ def is_installed(package: str) -> bool:
 
 
 def missing(what: str, package: str) -> str:
-    """Return what to type for the lack of a package.
+    """Return what to type for the lack of a package, by the name by which it is imported.
 
     >>> missing("a plot", "matplotlib")
     "a plot needs the package matplotlib: pip install 'mjcartpole[plot]'"
-
-    Args:
-        what: What needs it.
-        package: The name by which it is imported.
     """
     name = _NAMES.get(package, package)
     source = f"'mjcartpole[{EXTRAS[package]}]'" if package in EXTRAS else name
@@ -38,12 +34,6 @@ def missing(what: str, package: str) -> str:
 
 
 def check_installed(what: str, package: str, error: type[MjCartPoleError] = ConfigError) -> None:
-    """Refuse to go on where a package is missing.
-
-    Args:
-        what: What needs it.
-        package: The name by which it is imported.
-        error: What is raised; a `ConfigError` unless it says otherwise.
-    """
+    """Refuse to go on, by an error, where a package is missing that something needs."""
     if not is_installed(package):
         raise error(missing(what, package))

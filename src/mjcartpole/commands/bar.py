@@ -29,12 +29,9 @@ class Bar:
     """
 
     def __init__(self, doing: Callable[[], str], total: int = 0, unit: str = "") -> None:
-        """Say what is to come.
+        """Say what is being done at the moment, in a word, and how much there is to do of what.
 
-        Args:
-            doing: What is being done at the moment, in a word.
-            total: How much there is to do; 0 where nobody knows.
-            unit: What is counted.
+        A total of 0: nobody knows.
         """
         self.shown = sys.stderr.isatty() and os.environ.get("TERM") != "dumb"
         self.done, self.said = 0, ""

@@ -70,12 +70,8 @@ def write_film(
 ) -> tuple[Video, str]:
     """Draw rollouts and write them as a video; return that, and who has drawn it.
 
-    Args:
-        casts: See `Film`.
-        look: How it looks.
-        path: The video.
-        signals: Where a signal that shall end it is noted.
-        check: Called before each frame; what it raises ends it too.
+    For the casts see `Film`. A signal that shall end it is noted in `signals`; `check` is called
+    before each frame, and what it raises ends it too.
 
     Raises:
         Interrupted: A signal came; nothing was written.
@@ -144,12 +140,7 @@ def film_result(
 ) -> None:
     """Film the first evaluation episode of a run into videos/, and name it in the summary.
 
-    Args:
-        result: What was learned.
-        cartpole: The model that it was learned on.
-        folder: The run folder.
-        summary: Its summary; one that names a film was written before a kill.
-        signals: See `film`.
+    A summary that names a film was written before a kill. For the signals see `film`.
 
     Raises:
         Interrupted: See `film`.

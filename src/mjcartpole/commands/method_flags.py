@@ -14,13 +14,8 @@ _FLAG: Final = re.compile(r"--(no[-_])?([^=]+)(=.*)?", re.DOTALL)
 def lacking(words: Sequence[str], method: str, others: Iterable[str]) -> str | None:
     """Return that the method lacks an option that is given, whose it is, and what the method has.
 
-    Args:
-        words: The command line.
-        method: Who is to learn.
-        others: Options that do not belong to any method.
-
-    Returns:
-        None where no word looks like an option that some method has.
+    `others` are options that do not belong to any method. None where no word looks like an option
+    that some method has.
     """
     its, of_none = flags_of(method), list(others)
     of_any = [flag for each in METHODS for flag in flags_of(each)]

@@ -40,8 +40,7 @@ class Command:
     def default(cls, words: Sequence[str]) -> Self | None:
         """Return what is meant by flags that are left out; None: each has its own default.
 
-        Args:
-            words: The command line: one flag may decide the defaults of others.
+        One flag among the words may decide the defaults of others.
 
         Raises:
             ConfigError: A word makes no sense.

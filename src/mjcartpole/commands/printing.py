@@ -27,12 +27,7 @@ def with_added(disturbances: "Disturbances") -> str:
 
 
 def print_evaluation(result: "Evaluation", where: str = "") -> None:
-    """Print mean, minimum, and how the episodes ended.
-
-    Args:
-        result: What was played.
-        where: What else is to be said of where.
-    """
+    """Print mean, minimum, how the episodes ended, and what else is to be said of where."""
     print(
         f"\ngreedy evaluation on {result.backend}{where}{with_added(result.disturbances)}: "
         f"{counted(len(result.episodes), 'episode')}, seed {result.seed}\n"

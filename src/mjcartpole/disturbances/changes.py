@@ -25,10 +25,7 @@ class DisturbanceChanges(WorldDisturbances):
         return {name: value for name, value in values.items() if value not in (None, ())}
 
     def added_to(self, otherwise: Disturbances) -> Disturbances:
-        """Return the disturbances.
-
-        Args:
-            otherwise: What there is where nothing else is given.
+        """Return disturbances that are otherwise these.
 
         Raises:
             ConfigError: One makes no sense.

@@ -37,12 +37,7 @@ class Contexts(NamedTuple):
     widen: int
 
     def of(self, key: tuple[int, ...], number: int) -> Context:
-        """Return the context of an episode.
-
-        Args:
-            key: Seeds what draws it.
-            number: The episode, counted from 0.
-        """
+        """Return the context of an episode, counted from 0; the key seeds what draws it."""
         width = min(1.0, (number + 1) / self.widen) if self.widen else 1.0
         drawn = _shares(key, number // _BLOCK, len(self.ranges))[number % _BLOCK]
         if self.pool:
@@ -89,13 +84,9 @@ class Chance(NamedTuple):
 
     @classmethod
     def of(cls, np_random: np.random.Generator, index: int = 0) -> "Chance":
-        """Return that of an environment whose episodes a generator starts.
+        """Return that of an environment whose own generator starts its episodes; one of several by index.
 
         It has a stream of its own from the same seed: episodes start as without disturbances.
-
-        Args:
-            np_random: The environment's own generator.
-            index: Which of several environments that share it.
 
         Raises:
             ConfigError: Nobody knows its seed.

@@ -136,9 +136,7 @@ class Disturbances(WorldDisturbances):
     ) -> "Disturbances":
         """Return disturbances among keyword arguments, which are taken out of there.
 
-        Args:
-            settings: What was given by name, and more.
-            given: All of them in one; a mapping is as good as the value.
+        They may also be given all in one, a mapping or the value; other arguments stay.
 
         Raises:
             ConfigError: They make no sense, or one is given twice.
@@ -201,10 +199,7 @@ class Disturbances(WorldDisturbances):
     def effects(self, poles: int, control_step: float, task: Task) -> tuple["Effects", list[float]]:
         """Return the same as `actuate` and `sense` take it, and the memory of an episode.
 
-        Args:
-            poles: How many the model has.
-            control_step: Seconds.
-            task: The rules.
+        The model has so many poles, and its control step so many seconds.
 
         Raises:
             ConfigError: An episode is too short for a delay or a shove.

@@ -54,12 +54,9 @@ Controls = npt.NDArray[np.float64]
 def controls_of_pushes(
     actions: npt.ArrayLike, space: spaces.Space[Any], controls: Controls
 ) -> Controls:
-    """Return the controls of many pushes, shape (n,).
+    """Return the controls of many pushes, shape (n,), between those of action 0 and 1.
 
-    Args:
-        actions: Shape (n, 1).
-        space: All that they can be.
-        controls: Those of action 0 and 1.
+    Actions have the shape (n, 1), as their space has.
 
     Raises:
         InvalidActionError: They are not in the space.

@@ -33,13 +33,9 @@ class Disturber:
     def __init__(
         self, disturbances: Disturbances, cartpole: CartPole | None, task: Task, index: int = 0
     ) -> None:
-        """Begin before the first episode.
+        """Begin before the first episode of one environment, or of several with one generator.
 
-        Args:
-            disturbances: What is added.
-            cartpole: What moves, or what models are variants of; None on gymnasium's equations.
-            task: The rules.
-            index: Which of several environments with one generator.
+        What moves, or what models are variants of, is a cart-pole; None on gymnasium's equations.
 
         Raises:
             ConfigError: Some of it makes no sense for this model and these rules.
@@ -74,10 +70,8 @@ class Disturber:
     ) -> None:
         """Draw as the environment with this generator does; where it has that already, go on.
 
-        Args:
-            np_random: The environment's own.
-            chance: Draws the disturbances; made from the generator if left out.
-            episode: The next one, counted from 0.
+        Disturbances are drawn by `chance`, made from the generator if left out; the episode is the
+        next one, counted from 0.
         """
         if chance or np_random is not self._source:
             self._source, self._episode = np_random, episode
@@ -115,12 +109,9 @@ class Disturber:
     def wires(
         self, simulation: Simulation, see: Callable[[float], State], kind: Observation
     ) -> tuple[Callable[[float], State], Callable[[], Observed]]:
-        """Return what moves a simulation by a push, and what observes it.
+        """Return what moves a simulation by a push, and what observes it (see `observed`).
 
-        Args:
-            simulation: Is moved.
-            see: Moves it by a control.
-            kind: See `observed`.
+        To see is to move it by a control.
         """
         applied, slider = simulation.data.qfrc_applied, simulation.cartpole.slider
         controls = simulation.cartpole.controls

@@ -66,12 +66,9 @@ class Disturbers:
     def act(
         self, pushes: npt.NDArray[np.float64], resting: Ids, simulation: BatchSimulation
     ) -> npt.NDArray[np.float64]:
-        """Return the controls that the motors make of pushes; forces besides are applied.
+        """Return the controls that motors make of pushes from -1 to 1; forces besides are applied.
 
-        Args:
-            pushes: Shape (n,), -1 to 1.
-            resting: Those whose step does not count.
-            simulation: Takes the forces.
+        The step of those that rest does not count.
         """
         controls, forces = np.zeros(len(pushes)), np.zeros(len(pushes))
         idle = set(resting.tolist())

@@ -78,15 +78,10 @@ class Balance(control.Task):  # type: ignore[misc]
         rules: Task = CARTPOLE_V1,
         observation: Observation = "state",
     ) -> None:
-        """Take what decides an episode.
+        """Take what decides an episode; it is cut off after `limit` control steps.
 
-        Args:
-            cartpole: What moves.
-            random: Draws the starting states; or a seed, or None to draw one.
-            limit: Control steps until an episode is cut off.
-            discrete: Whether actions are 0 and 1, instead of controls.
-            rules: Limits, starting states and rewards.
-            observation: Whether angles are observed themselves, or by cosine and sine.
+        `random` draws the starting states, or is a seed, or None to draw one. Actions are 0 and 1
+        if they are discrete, else controls; angles are observed themselves, or by cosine and sine.
 
         Raises:
             ConfigError: There is no such observation.

@@ -14,12 +14,9 @@ from mjcartpole.task import Task, resolve
 
 
 def rules_of(task: Task | str, changes: Changes, *, sutton_barto_reward: bool) -> Task:
-    """Return an environment's rules.
+    """Return an environment's rules: those of a task but for changes, and for the reward's.
 
-    Args:
-        task: What they are, but for the changes.
-        changes: Those that are other ones.
-        sutton_barto_reward: Whether the reward is -1 at the end, whatever else it was.
+    With `sutton_barto_reward` it is -1 at the end, whatever else it was.
 
     Raises:
         ConfigError: They make no sense, or name two rewards.
@@ -47,10 +44,7 @@ def added_of(
 ) -> Disturbances:
     """Return an environment's disturbances; those among keyword arguments are taken out of there.
 
-    Args:
-        more: Rules and disturbances, by name.
-        disturbances: All of them in one.
-        edits: Of the model, which does not vary by the same numbers.
+    They may also be given all in one. What is edited does not vary.
 
     Raises:
         ConfigError: They make no sense, one is given twice, or an edit would have no effect.
@@ -69,10 +63,7 @@ def start_bounds(
     >>> start_bounds({"low": -0.01}, (-0.05, 0.05))
     (-0.01, 0.05)
 
-    Args:
-        options: What `reset` was given.
-        usual: The bounds where it says nothing.
-        others: Options beside "low" and "high" that are read elsewhere.
+    What is left out is as usual; options beside "low" and "high" are read elsewhere.
 
     Raises:
         ConfigError: An option is unknown, a bound is no finite number, or low is above high.

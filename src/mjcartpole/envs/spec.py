@@ -33,13 +33,10 @@ class PortableSpec:
 
 
 def portable(spec: EnvSpec, cartpole: CartPole) -> EnvSpec:
-    """A specification whose arguments are numbers, texts, lists and dicts.
+    """A specification, as gymnasium makes it, whose arguments are numbers, texts, lists and dicts.
 
-    A model that is no name, path or text is there as its document, edits included.
-
-    Args:
-        spec: As gymnasium makes it.
-        cartpole: What the environment made of the arguments.
+    A model that is no name, path or text is there as the document that the environment made of it,
+    edits included.
     """
     task = spec.kwargs.get("task")
     changes = task.changes if isinstance(task, Task) else {}

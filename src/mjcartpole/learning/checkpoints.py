@@ -115,13 +115,7 @@ def save_checkpoint(folder: Path, checkpoint: Checkpoint) -> None:
 def load_checkpoint(
     path: Path, config: TrainConfig, document: str, *, poles: int = 1
 ) -> Checkpoint:
-    """Read a checkpoint of a training.
-
-    Args:
-        path: The file.
-        config: The config that it must be of.
-        document: The model that it must be of.
-        poles: How many that has.
+    """Read a checkpoint of a training with this config, on a model with this document and poles.
 
     Raises:
         CheckpointError: It is not there, damaged, or of another training.

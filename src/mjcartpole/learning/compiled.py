@@ -66,15 +66,9 @@ class CompiledLoop:
         disturbances: Disturbances = NONE,
         fitted: Fitted | None = None,
     ) -> None:
-        """Load the model.
+        """Load the model; the first five are those of a `World` whose backend is not `unavailable`.
 
-        Args:
-            backend: Who does the physics. It must not be `unavailable`.
-            model: See `load_model`; for backend mujoco.
-            integrator: See `Simulation`; for backend mujoco.
-            task: The rules.
-            disturbances: What is added; not to a fitted model, which is none of them.
-            fitted: Plays in this model of the world instead of in the world.
+        A model that was `fitted` takes the place of the world; nothing disturbs that one.
 
         Raises:
             ModelError: The model cannot be used.
@@ -105,13 +99,9 @@ class CompiledLoop:
     ) -> Iterator[int]:
         """Do what `learn_episodes` does, chunk by chunk.
 
-        Args:
-            learner: Learns; its table and generator are changed in place.
-            discretizer: From observations to the learner's states.
-            env_rng: Draws the starting states.
-            log: Takes the episodes; it holds those before `numbers`.
-            numbers: Which episodes, counted from 0: they decide what the schedules give.
-            chance: Draws the disturbances, where there are some.
+        The learner's table and generator are changed in place; `env_rng` draws the starting states,
+        `chance` disturbances, where there are some. The log takes the episodes `numbers`, counted
+        from 0, which decide what the schedules give; it holds those before.
 
         Yields:
             The number of episodes in the log.
@@ -185,11 +175,8 @@ class CompiledLoop:
     ) -> EpisodeLog:
         """Play greedy episodes, as `play_episode` does.
 
-        Args:
-            policy: Acts.
-            starts: Draws the starting states, or has them as rows.
-            episodes: How many.
-            chance: Draws the disturbances, where there are some.
+        Starting states are drawn, or are the rows of an array; `chance` draws disturbances, where
+        there are some.
 
         Raises:
             SimulationError: The physics diverged; names episode and step.

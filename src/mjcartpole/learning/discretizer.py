@@ -138,11 +138,7 @@ class Discretizer:
         return self.bins if self.tilings == 1 else (self.tilings, *self.bins)
 
     def __call__(self, values: Sequence[float]) -> int:
-        """State of an observation; of one grid its row in a C-ordered array of shape `bins`.
-
-        Args:
-            values: The observation as plain floats, shape (d,).
-        """
+        """State of an observation, plain floats of shape (d,); of one grid its row in C order."""
         return row_of(values, self.grid)
 
     def folded(self, values: Sequence[float]) -> tuple[int, bool]:
@@ -153,10 +149,8 @@ class Discretizer:
         """Return the values of both actions in all rows of one mirrored grid.
 
         Of equal values the first is played, which is the second one in the mirror: where a learned
-        state has a tie, its first action is put ahead by the last digit.
-
-        Args:
-            learned: Shape (n_rows, 2); what is in the second half does not count.
+        state has a tie, its first action is put ahead by the last digit. In the second half of
+        `learned`, shape (n_rows, 2), nothing counts.
         """
         half = self.n_rows // 2
         values = learned[: self.n_rows - half].copy()

@@ -16,10 +16,7 @@ Observation = npt.NDArray[np.float32]
 def look(env: gymnasium.Env[Any, Any], steps: int, rng: np.random.Generator) -> tuple[Seen, int]:
     """Play random actions in the world; returns what was seen, and in how many episodes.
 
-    Args:
-        env: The world.
-        steps: How many steps, in as many episodes as that takes; below 0: the first episode.
-        rng: Draws actions.
+    So many steps in as many episodes as that takes; below 0: the first episode.
 
     Raises:
         SimulationError: The physics diverged.

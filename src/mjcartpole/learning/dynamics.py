@@ -14,13 +14,7 @@ from mjcartpole.task import Task, worst_pole
 
 
 def dynamics_of(cartpole: CartPole | None, integrator: Integrator, task: Task) -> Dynamics:
-    """Return what a step does; of many states, for each of them anew.
-
-    Args:
-        cartpole: The model; None for CartPole-v1's own equations.
-        integrator: See `Simulation`.
-        task: The rules.
-    """
+    """Return what a step does; of many states, for each anew. Without a model: CartPole-v1's."""
     simulation = None if cartpole is None else Simulation(cartpole, integrator)
 
     def dynamics(states: Vector, action: int) -> tuple[Vector, Vector, npt.NDArray[np.bool_]]:

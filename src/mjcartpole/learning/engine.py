@@ -31,13 +31,8 @@ def choose_engine(
 ) -> Engine:
     """Return the engine that was asked for, or the reference loop where that one cannot run.
 
-    Logs one line, once, where the reference loop takes over.
-
-    Args:
-        engine: What was asked for.
-        backend: Who does the physics.
-        cartpole: The model, where it is known and the backend is mujoco.
-        task: The rules.
+    Logs one line, once, where the reference loop takes over. The model is given where it is known
+    and the backend is mujoco.
 
     Raises:
         ConfigError: There is no such engine.

@@ -29,13 +29,7 @@ class Episode(NamedTuple):
 
 
 def ending_index(terminated: bool, x: float, x_limit: float) -> int:
-    """Return why an episode ended, as an index of `ENDINGS`.
-
-    Args:
-        terminated: Whether the rules ended it.
-        x: The cart's last position, m.
-        x_limit: How far it may be from the middle, m.
-    """
+    """Return why an episode ended with the cart at x, m, as an index of `ENDINGS`."""
     if not terminated:
         return 0
     return 1 if abs(x) > x_limit else 2
@@ -44,10 +38,8 @@ def ending_index(terminated: bool, x: float, x_limit: float) -> int:
 def side_index(ending: int, x: float, theta: float) -> int:
     """Return on which side an episode ended, as an index of `SIDES`.
 
-    Args:
-        ending: Why, as an index of `ENDINGS`.
-        x: The cart's last position, m.
-        theta: The last angle of the pole, of several that of the one that leans most, rad.
+    `ending` is an index of `ENDINGS`, x the cart's last place, m, and theta the last angle of the
+    pole that leans most, rad.
     """
     if ending == 0:
         return 0
@@ -76,11 +68,7 @@ class EpisodeLog(Sequence[Episode]):
     """
 
     def __init__(self, capacity: int) -> None:
-        """An empty log.
-
-        Args:
-            capacity: The most episodes that it can take.
-        """
+        """An empty log, for at most so many episodes."""
         self.storage = Columns(
             np.empty(capacity, np.float64),
             np.empty(capacity, np.int32),

@@ -344,12 +344,9 @@ def why_not_compilable(reward: Reward) -> str:
 def _sources(reward: Any, *functions: Any) -> str:
     """Return a checksum of all that is compiled into an entry; nothing where that is not known.
 
-    Args:
-        reward: The reward of the task.
-        functions: Those of a method; all files count that have one of them, or one that they call.
-
-    Numba keeps what it compiled until the file of the entry changes, and would not see that another
-    file did. A value that an entry closes over is part of the cache's key.
+    All files count that have one of a method's functions, or one that these call. Numba keeps what
+    it compiled until the file of the entry changes, and would not see that another file did. A
+    value that an entry closes over is part of the cache's key.
     """
     constants = _globals_of(reward)
     # Functions and objects that a reward takes from elsewhere change without its own text.

@@ -35,12 +35,7 @@ class Learner:
     """
 
     def __init__(self, config: TrainConfig, discretizer: Discretizer) -> None:
-        """Begin with what has learned nothing.
-
-        Args:
-            config: What is trained.
-            discretizer: From observations to the method's states.
-        """
+        """Begin with what has learned nothing, for the states of a grid."""
         self.method: Any = method_named(config.method)
         self.p = numbers_of(config, self.method.Numbers, tiles_of(discretizer))
         self.rng = np.random.default_rng(np.random.SeedSequence(config.seed, spawn_key=(STREAM,)))

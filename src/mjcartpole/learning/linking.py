@@ -58,10 +58,7 @@ floats, ints = _array_at(types.float64), _array_at(types.int64)
 def for_each(mujoco: F, gym: F, **others: Callable[..., Any]) -> Callable[[F], F]:
     """Let Numba take one function of these for a stub, by the physics: its first argument.
 
-    Args:
-        mujoco: That for `MujocoPhysics`.
-        gym: That for all kinds without one of their own.
-        others: Those, by the names of the kinds.
+    `others` go by the names of their kinds; `gym` is for all kinds without one of their own.
     """
     functions: dict[str, Any] = {"MujocoPhysics": mujoco, **others}
 

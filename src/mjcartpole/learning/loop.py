@@ -33,12 +33,9 @@ def learn_episodes(
 ) -> Iterator[Episode]:
     """Let a learner play and learn, one episode per item.
 
-    Args:
-        env: Any environment with CartPole-v1's spaces and an end to every episode; it draws its
-            starting states from the generator that it has.
-        learner: Chooses actions, and learns after each step and each episode.
-        discretizer: From observations to the learner's states.
-        numbers: Which episodes, counted from 0: they decide what the schedules give.
+    The environment has CartPole-v1's spaces and an end to every episode, and draws its starting
+    states from the generator that it has. Episodes are counted from 0, which decides what the
+    schedules give.
 
     Raises:
         SimulationError: The physics diverged; names episode and step.
@@ -96,13 +93,7 @@ def lend(
 
 
 def in_episode(error: SimulationError, number: int, steps: int) -> SimulationError:
-    """Return the same error with where it happened.
-
-    Args:
-        error: What went wrong.
-        number: The episode, counted from 0.
-        steps: Its steps before that.
-    """
+    """Return the same error with where it happened: in which episode, after how many steps."""
     return SimulationError(f"episode {number + 1:,}, step {steps + 1}: {error}")
 
 
@@ -116,12 +107,8 @@ def play_episode(
 ) -> tuple[Episode, list[State]]:
     """Play one episode without learning.
 
-    Args:
-        env: The environment.
-        policy: From an observation, float32 of shape (4,), to an action.
-        number: Number of the episode, for the record.
-        seed: Seeds the environment if given.
-        start: Begins in this state instead of one that is drawn, which nothing then seeds.
+    The policy goes from an observation, float32 of shape (4,), to an action. The episode has its
+    number for the record; it begins in `start`, or in a state that is drawn, seeded if need be.
 
     Returns:
         The episode, and its states from the first to the last, each float64 of shape (4,).

@@ -14,12 +14,7 @@ Ints = npt.NDArray[np.int64]
 
 
 def cells_of(discretizer: Discretizer, states: Floats) -> Ints:
-    """Return what `row_of` puts together: a cell in each used dimension, shape (n, used).
-
-    Args:
-        discretizer: From observations to states.
-        states: Shape (n, dimensions).
-    """
+    """Return what `row_of` puts together: a cell in each used dimension, shape (n, used)."""
     grid = discretizer.grid
     cells = np.zeros((len(states), len(grid.bins)), np.int64)
     for axis, n in enumerate(grid.bins):
@@ -32,13 +27,7 @@ def cells_of(discretizer: Discretizer, states: Floats) -> Ints:
 
 
 def values_in(discretizer: Discretizer, table: Floats, states: Floats) -> Floats:
-    """Return the values of both actions in many states, shape (n, 2).
-
-    Args:
-        discretizer: From observations to states.
-        table: Action values, as a policy has them.
-        states: Shape (n, dimensions).
-    """
+    """Return the values of both actions, by a policy's table, in many states, shape (n, 2)."""
     grid, tiles, q = discretizer.grid, tiles_of(discretizer), table.reshape(-1, N_ACTIONS)
     cells = cells_of(discretizer, states)
     if not discretizer.mirror:

@@ -31,10 +31,7 @@ def run_name(preset: str, config: TrainConfig, seeds: int = 1) -> str:
     >>> run_name("tuned", TrainConfig(alpha=0.2, set=("pole.length=1.5",), seed=7), seeds=3)
     'tuned-mujoco-pole.length1.5-alpha0.2-seeds7-9'
 
-    Args:
-        preset: Name of the preset that the config began from.
-        config: All that decides the training.
-        seeds: How many seeds from the config's own on are trained.
+    The config began from the preset; so many seeds from its own on are trained.
     """
     seed = config.seed
     which = f"seed{seed}" if seeds == 1 else f"seeds{seed}-{seed + seeds - 1}"

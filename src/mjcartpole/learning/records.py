@@ -110,9 +110,7 @@ def _indices(words: npt.NDArray[Any], known: Sequence[str]) -> npt.NDArray[np.in
 def read_visits(folder: Path, grid: Discretizer) -> npt.NDArray[np.int64] | None:
     """Return how often each action was taken in each state; None where it was not counted.
 
-    Args:
-        folder: A run folder.
-        grid: Of its policy.
+    The grid is that of the run's policy.
 
     Raises:
         RunError: They are damaged, or those of another table.
@@ -137,11 +135,7 @@ def _read_greedy(path: Path) -> tuple[tuple[int, float], ...]:
 
 
 def _read_table(path: Path, *kinds: dict[str, str]) -> npt.NDArray[Any]:
-    """Return the lines of a table under a line of names.
-
-    Args:
-        path: The file.
-        kinds: The columns that it may have, by name.
+    """Return the lines of a table under a line of names: one of several kinds that it may have.
 
     Raises:
         RunError: It cannot be read, or has other columns.

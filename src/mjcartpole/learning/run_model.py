@@ -73,11 +73,7 @@ def stored_model(
 ) -> CartPole:
     """The model of a run from the document that it stores, under the name that was trained on.
 
-    Args:
-        document: The document.
-        config: The run's.
-        folder: The run's.
-        allow_assets: Other folders in which the files that it names may lie.
+    The files that it names lie in the run's folder, or in `allow_assets`.
 
     Raises:
         ModelError: The document was damaged, or names a file elsewhere.

@@ -86,9 +86,8 @@ class Run:
     ) -> CartPole:
         """Load the model as it was in training.
 
-        Args:
-            allow_assets: Other folders than the run's in which the files that it names may lie.
-            own_timestep: See `load_model`; as a run that was trained so.
+        The files that it names lie in the run's folder, or in `allow_assets`. For `own_timestep`
+        see `load_model`; a run that was trained so has it anyway.
 
         Raises:
             ModelError: It cannot be used, or names a file elsewhere.
@@ -125,13 +124,9 @@ class Begun:
 
 @contextlib.contextmanager
 def claimed_folder(folder: Path, *, overwrite: bool = False) -> Iterator[None]:
-    """Hold a folder for a new run, before the work begins.
+    """Hold a folder for a new run, before the work begins; one that holds a run needs `overwrite`.
 
     If the work fails before there is anything to go on from, what `begin_run` wrote goes again.
-
-    Args:
-        folder: The run folder. An empty one is taken; one that holds a run needs `overwrite`.
-        overwrite: Whether a run that is there may be replaced.
 
     Raises:
         RunError: Something is there that may not be replaced, or another training is at work.
@@ -269,9 +264,8 @@ def load_run(folder: str | os.PathLike[str]) -> Run:
 def resumed_folder(path: Path, allow_assets: Sequence[Path] = ()) -> Iterator[Begun]:
     """Hold the folder of a run that is to be continued.
 
-    Args:
-        path: A run folder, for its own checkpoint, or another checkpoint in it.
-        allow_assets: Other folders in which the files of its model may lie.
+    The path is a run folder, for its own checkpoint, or another checkpoint in it. The files of its
+    model lie there, or in `allow_assets`.
 
     Raises:
         RunError: There is no training to be continued, or another one is at work.

@@ -2,13 +2,9 @@
 
 
 def linear(start: float, end: float, episodes: float, episode: int) -> float:
-    """Return the value of a straight line from `start` to `end`, constant afterwards.
+    """Return the value of a straight line from `start` in episode 0 to `end`, constant afterwards.
 
-    Args:
-        start: Value of episode 0.
-        end: Value from episode `episodes` on.
-        episodes: Length of the slope; 0 means `end` from the beginning.
-        episode: Counted from 0.
+    The slope is so many episodes long; 0 means `end` from the beginning.
     """
     if episode >= episodes:
         return end

@@ -37,13 +37,9 @@ class Session:
     def __init__(
         self, folder: Path, training: Training, cartpole: CartPole, *, every: float
     ) -> None:
-        """Take a folder that is claimed or locked (see runs.py).
+        """Take a folder that is claimed or locked (see runs.py), and the model that it stores.
 
-        Args:
-            folder: The run folder.
-            training: What is run, restored where it is continued.
-            cartpole: The model that the folder stores.
-            every: Seconds between two checkpoints; 0 saves after each chunk of episodes.
+        A checkpoint is saved after `every` so many seconds; 0: after each chunk of episodes.
 
         Raises:
             ConfigError: The interval makes no sense.

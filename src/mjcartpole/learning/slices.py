@@ -63,14 +63,11 @@ def choose_axes(
     over: str | None = None,
     at: Mapping[str, float] | None = None,
 ) -> Axes:
-    """Return which dimensions are shown; what is left out is chosen.
+    """Return which dimensions of a table are shown; what is left out is chosen.
 
-    Args:
-        grid: The table's.
-        dims: Names of the horizontal and the vertical one; angle and angular velocity if left out.
-        over: Name of the one that differs from slice to slice, or "none".
-        at: Values at which others are held; 0, or the middle of their range, if left out; of an
-            action before 1.
+    `dims` are the horizontal and the vertical one, angle and angular velocity if left out; `over`
+    is the one that differs from slice to slice, or "none". Others are held `at` a value: if left
+    out at 0, or in the middle of their range; an action before at 1.
 
     Raises:
         ConfigError: There is no such dimension, or one is asked for twice.
@@ -157,14 +154,9 @@ def slices(
 ) -> Grid:
     """Return slices of a table, ready to be drawn: a row for each thing that is shown.
 
-    Args:
-        title: What a person calls the table.
-        grid: Its grid.
-        table: Action values, as a policy has them.
-        axes: Which dimensions.
-        visits: How often each action was taken in each state, shape (*bins, 2); None: not known.
-        shown: What.
-        limits: Where an episode ends along both dimensions.
+    The table has action values as a policy has them, and is called by the title. Visits, shape
+    (*bins, 2), say how often each action was taken in each state; None: not known. Limits are where
+    an episode ends along both dimensions.
     """
     for name in shown:
         check_known("picture of a table", name, SHOWN)

@@ -37,11 +37,8 @@ def read_document(
 ) -> Made:
     """Return what a file of a run folder stands for.
 
-    Args:
-        path: The file.
-        fields: What it holds; None leaves that to `make`.
-        make: Makes what it stands for from the values, or raises ValueError.
-        otherwise: What is said of a file that does not stand for it.
+    Its fields are checked; None leaves that to `make`, which makes of the values what they stand
+    for, or raises ValueError. `otherwise` is said of a file that does not stand for it.
 
     Raises:
         RunError: It cannot be read, or holds something else.

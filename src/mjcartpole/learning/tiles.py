@@ -26,7 +26,7 @@ the array, Python a quicker view."""
 
 
 class Tiles(NamedTuple):
-    """Several offset grids, or one of nodes."""
+    """Several offset grids, or one of nodes; None in their place: a state is a row."""
 
     bits: int
     """There are 2^bits of them; or as many cells between two nodes."""
@@ -66,12 +66,7 @@ def all_weights(tiles: Any) -> int:
 
 
 def home(tiles: Any, s: int) -> int:
-    """Return the row that a state is counted in: of the tiling that is not moved, the nearest node.
-
-    Args:
-        tiles: `Tiles`, or None where a state is a row.
-        s: The state.
-    """
+    """Return the row that a state is counted in: of the unmoved tiling, or the nearest node."""
     if tiles is None:
         return s
     half = (1 << tiles.bits) >> 1 if tiles.interpolated else 0
@@ -98,11 +93,7 @@ def row_in(tiles: Any, tiling: int, row: int, within: int) -> int:
 def node_at(tiles: Any, corner: int, row: int, within: int) -> tuple[int, float]:
     """Return the row of one of the nodes around a state, and its weight; these sum to 1.
 
-    Args:
-        tiles: `Tiles`.
-        corner: Which of the nodes: a bit for each dimension, set on the far side.
-        row: What `place` returned.
-        within: And this.
+    A corner has a bit for each dimension, set on the far side; the rest is what `place` returned.
     """
     cells, weight, stride = 1 << tiles.bits, 1.0, 1
     for axis in range(len(tiles.bins) - 1, -1, -1):
@@ -118,13 +109,7 @@ def node_at(tiles: Any, corner: int, row: int, within: int) -> tuple[int, float]
 
 
 def pair_at(tiles: Any, q: Table, s: int) -> tuple[float, float]:
-    """Return the values of both actions in a state.
-
-    Args:
-        tiles: `Tiles`, or None where a state is a row.
-        q: A table.
-        s: The state.
-    """
+    """Return the values of both actions in a state."""
     if tiles is None:
         return q[2 * s], q[2 * s + 1]
     row, within = place(tiles, s)
@@ -166,13 +151,9 @@ def add_at(tiles: Any, q: Table, s: int, a: int, change: float) -> None:
 
 
 def greedy(tiles: Any, choices: Any, s: int, folding: int) -> int:
-    """Return the better action of a state; 0 between equals.
+    """Return the better action of a state; 0 between equals. For the folding see `Grid`.
 
-    Args:
-        tiles: `Tiles`, or None where a state is a row.
-        choices: The table, flat; where a state is a row, the action of each.
-        s: The state.
-        folding: See `Grid`.
+    The choices are the table, flat; where a state is a row, the action of each.
     """
     if tiles is None:
         return int(choices[s])

@@ -145,11 +145,8 @@ class Training:
     ) -> None:
         """Make the environment and the learner.
 
-        Args:
-            config: What to train.
-            env: Trains here instead of on the config's own environment, with the Python engine.
-            engine: Who runs the loop; where the compiled one cannot run, the other does.
-            cartpole: The config's model, if it is loaded already.
+        An environment of one's own takes the place of the config's, with the Python engine; that
+        runs as well where the compiled one cannot. The config's model is given if it is loaded.
 
         Raises:
             ConfigError: There is no such engine, the config's grid is for another number of

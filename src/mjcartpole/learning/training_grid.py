@@ -19,10 +19,7 @@ def training_grid(
 ) -> Discretizer:
     """Return the grid of a training, mirrored if that is asked for, or open and all is symmetric.
 
-    Args:
-        config: What is trained.
-        cartpole: Its model; backend gym has its own.
-        env: An environment of one's own, of which nothing is known.
+    Backend gym has a model of its own, and of an environment of one's own nothing is known.
 
     Raises:
         ConfigError: It is for another number of poles, or what is to be mirrored is not symmetric.

@@ -35,14 +35,7 @@ class Worlds:
         disturbances: Disturbances,
         fitted: Fitted | None = None,
     ) -> None:
-        """Make the first one.
-
-        Args:
-            cartpole: See above.
-            integrator: See `Simulation`.
-            task: The rules.
-            disturbances: What is added.
-            fitted: Takes the place of the world.
+        """Make the first one; what was fitted takes the place of the world.
 
         Raises:
             ConfigError: A disturbance makes no sense here.
@@ -57,12 +50,7 @@ class Worlds:
         self._first = self._make(cartpole)
 
     def physics(self, chance: Chance | None, number: int) -> Physics:
-        """Return that of an episode.
-
-        Args:
-            chance: Draws disturbances, where there are some.
-            number: The episode, counted from 0.
-        """
+        """Return that of an episode; where there are disturbances, `chance` draws them."""
         world = self._first
         if self._contexts and chance and self.cartpole:
             world = self._kept(variant(self.cartpole, chance.context(self._contexts, number)))

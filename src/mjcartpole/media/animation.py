@@ -37,15 +37,10 @@ _SEEN_EVERY: Final = 4
 
 
 def write_gif(path: Path, frames: Iterator[Frame], fps: float) -> int:
-    """Write an endless GIF; returns the number of frames in it.
+    """Write an endless GIF of pictures of one size, (height, width, 3); returns how many are in it.
 
     A frame's end is rounded to GIF's ticks of 10 ms, so that the length is right in total; what
     comes faster than 50 frames per second is thinned out to that.
-
-    Args:
-        path: The file.
-        frames: Pictures of shape (height, width, 3), all of one size.
-        fps: Frames per second.
 
     Raises:
         RenderError: The pictures are too large for the format.
@@ -69,15 +64,10 @@ def write_gif(path: Path, frames: Iterator[Frame], fps: float) -> int:
 
 
 def write_webp(path: Path, frames: Iterator[Frame], fps: float) -> int:
-    """Write an endless WebP without loss; returns the number of frames in it.
+    """Write an endless WebP without loss, of pictures of one size; returns how many are in it.
 
     A frame's end is rounded to milliseconds, so that the length is right in total; what comes
     faster than 90 frames per second is thinned out to that.
-
-    Args:
-        path: The file.
-        frames: Pictures of shape (height, width, 3), all of one size.
-        fps: Frames per second.
 
     Raises:
         RenderError: The pictures, or all of them together, are too large for the format.
@@ -101,10 +91,7 @@ def write_webp(path: Path, frames: Iterator[Frame], fps: float) -> int:
 def changed_box(before: Frame | None, frame: Frame, *, grid: int = 1) -> Box:
     """The smallest rectangle outside of which two frames are equal; one pixel if they are equal.
 
-    Args:
-        before: The frame that is shown already; None if there is none, which changes all.
-        frame: The frame to show.
-        grid: Left and top are multiples of this.
+    Without a frame before, all has changed. Left and top are multiples of the grid.
     """
     height, width = frame.shape[:2]
     if before is None:

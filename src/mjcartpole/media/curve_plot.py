@@ -164,13 +164,10 @@ def places(n: int, first: int, most: int = MOST_POINTS) -> npt.NDArray[np.int64]
 def line_of_run(
     name: str, returns: Floats, window: int, greedy: Sequence[tuple[int, float]] = ()
 ) -> Line:
-    """Return the curve of one run.
+    """Return the curve of one run with an episode at least.
 
-    Args:
-        name: What a person calls it.
-        returns: Of each episode; at least one.
-        window: Episodes of the running mean; no more than there are.
-        greedy: Training episodes before an evaluation, and its mean return.
+    The running mean is over a window of no more episodes than there are. `greedy` has training
+    episodes before an evaluation, and its mean return.
     """
     at = places(len(returns), window)
     middle = running_mean(returns, window)[at - window]

@@ -10,16 +10,10 @@ Frame = npt.NDArray[np.uint8]
 
 
 def check_frame(frame: Frame, name: str, shape: tuple[int, ...], whole: str) -> None:
-    """Refuse what is no picture, or not of the first one's shape.
+    """Refuse what is no picture, or not of the first one's shape (RenderError).
 
-    Args:
-        frame: What somebody has drawn.
-        name: What it is called, such as "frame 3".
-        shape: Of the first one.
-        whole: What needs pictures of one size, such as "frames of a video".
-
-    Raises:
-        RenderError: See above.
+    It is called by a name, such as "frame 3"; the whole is what needs pictures of one size, such as
+    "frames of a video".
     """
     if frame.ndim != 3 or frame.shape[2] != 3 or frame.dtype != np.uint8 or not frame.size:
         raise RenderError(

@@ -212,10 +212,7 @@ def works(backend: Backend) -> bool:
 def make_context(backend: Backend, width: int, height: int) -> Context:
     """Make an OpenGL context; its maker frees it, in the order MuJoCo's context, then this one.
 
-    Args:
-        backend: One that `works`.
-        width: Pixels of the largest picture.
-        height: Pixels of the largest picture.
+    The backend is one that `works`; pixels are those of the largest picture.
 
     Raises:
         RenderError: There is no such backend, or it gives no context.

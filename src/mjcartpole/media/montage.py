@@ -26,12 +26,9 @@ def side_by_side(
     """Films in a grid, each under its label, row by row; one new array per frame.
 
     It lasts as long as the longest film; one that has ended stands still at its last frame,
-    paler. Frames are drawn one at a time: nothing is kept but the last one of each film.
-
-    Args:
-        streams: Frames of shape (height, width, 3), of one size.
-        labels: One for each stream; one that is too long is shortened in its middle.
-        columns: Films in a row; None makes the grid about as wide as it is high.
+    paler. Frames are drawn one at a time: nothing is kept but the last one of each film. They have
+    one size, (height, width, 3); a label that is too long is shortened in its middle. Without
+    `columns`, the films in a row, the grid is about as wide as it is high.
 
     Raises:
         RenderError: No stream, not as many labels, an empty stream, or frames of several sizes.
@@ -55,12 +52,10 @@ def side_by_side(
 def sheet(
     frames: Sequence[Pixels], captions: Sequence[str], *, columns: int | None = None
 ) -> Pixels:
-    """A contact sheet: frames as one picture, row by row, each over its caption.
+    """A contact sheet: frames of one size as one picture, row by row, each over its caption.
 
-    Args:
-        frames: Shape (height, width, 3), of one size.
-        captions: One for each frame, such as `time_label(step)`.
-        columns: Frames in a row; None takes five, or fewer where there are fewer.
+    Captions are such as `time_label(step)`. A row has `columns` frames, or five, or fewer where
+    there are fewer.
 
     Returns:
         A picture of shape (rows * (height + caption), columns * width and separators, 3).
@@ -83,13 +78,10 @@ def equally_spaced(total: int, count: int) -> list[int]:
 def last_seconds(
     total: int, *, seconds: float = 1.0, speed: float = 0.25, steps_per_second: float = 50.0
 ) -> npt.NDArray[np.float64]:
-    """Where in an episode each frame of its slow ending lies.
+    """Where each frame of the slow ending of an episode of `total` states, one per step, lies.
 
-    Args:
-        total: States of the episode, one per control step.
-        seconds: How much of the end is shown; all of a shorter episode.
-        speed: Control steps per frame: 0.25 shows it four times as slowly as one frame each.
-        steps_per_second: How long a control step takes.
+    So many seconds of the end are shown, or all of a shorter episode, at a speed of control steps
+    per frame: 0.25 shows it four times as slowly as one frame each.
 
     Returns:
         Places, in control steps since the start and not whole ones, the last state's among them;
@@ -115,11 +107,9 @@ def played(total: float, *, speed: float = 1.0) -> npt.NDArray[np.float64]:
 
 
 def state_at(states: npt.ArrayLike, place: float) -> npt.NDArray[np.float64]:
-    """The state at a place between control steps: on a straight line from one to the next.
+    """The state at a place between control steps: on a straight line from one row to the next.
 
-    Args:
-        states: One row each.
-        place: In control steps since the first state.
+    The place is in control steps since the first state.
     """
     table: npt.NDArray[np.float64] = np.asarray(states, dtype=np.float64)
     place = min(max(place, 0.0), len(table) - 1.0)

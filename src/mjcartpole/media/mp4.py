@@ -56,13 +56,8 @@ def write_mp4(path: Path, frames: Iterator[Frame], fps: float) -> int:
     """Write frames as H.264 with 4:2:0 colours, with the index first; returns their number.
 
     PyAV itself and not imageio's plugin, which keeps the codec's options and the colours'
-    conversion to itself.
-
-    Args:
-        path: The file; its name needs no suffix.
-        frames: Pictures of shape (height, width, 3), all of one size; odd ones lose their last row
-            or column.
-        fps: Frames per second.
+    conversion to itself. Of pictures with odd sizes, all of one, the last row or column is lost; the
+    file's name needs no suffix.
 
     Raises:
         RenderError: The encoder fails.

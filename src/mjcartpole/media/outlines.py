@@ -146,9 +146,7 @@ class _Body:
     def bands(self, ring: Points, ends: Points) -> None:
         """Draw what a ring sweeps over between its places: a few times, narrower and brighter.
 
-        Args:
-            ring: Around the geom's middle, shape (n, 3).
-            ends: Where the ring is put, shape (k, 3).
+        The ring, shape (n, 3), is around the geom's middle, and put at each of its ends, (k, 3).
         """
         # One blend of a see-through geom is enough.
         bands = _BANDS if self.rgba[3] >= 1 else _BANDS[1:2]

@@ -43,14 +43,7 @@ class Overlay:
         self._arrows: dict[tuple[int, int], Pixels] = {}
 
     def draw(self, frame: Pixels, moment: Moment) -> Pixels:
-        """Write into the frame that the scene's renderer has drawn last.
-
-        Args:
-            frame: Shape (height, width, 3); it is changed.
-            moment: What to show.
-
-        Returns:
-            The same frame.
+        """Write a moment into the frame that the scene's renderer has drawn last, and return it.
 
         Raises:
             RenderError: The frame has another size than the scene's pictures.

@@ -19,10 +19,7 @@ _NUMBERED: Final = re.compile(r"\d{6,}\.png")
 def write_pictures(folder: Path, frames: Iterator[Frame], fps: float) -> int:
     """Write frames as 000000.png, 000001.png, … into a folder; returns their number.
 
-    Args:
-        folder: An existing folder.
-        frames: Pictures of shape (height, width, 3).
-        fps: Frames per second, which pictures do not tell.
+    How many there are per second pictures do not tell.
 
     Raises:
         RenderError: imageio is not installed.

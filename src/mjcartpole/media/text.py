@@ -39,12 +39,8 @@ class Lettering:
     def number(self, target: Pixels, number: str, colour: Colour = INK) -> None:
         """Write a number at the right end of a row; what has no room on the left is left out.
 
-        Digits stand in cells of equal width, so that nothing jumps from frame to frame.
-
-        Args:
-            target: Shape (height, width, 3), of paper.
-            number: Any text; kerning is left out.
-            colour: Of the ink.
+        Digits stand in cells of equal width, so that nothing jumps from frame to frame. The row is of
+        paper, shape (height, width, 3); any text will do, without kerning.
         """
         right = target.shape[1]
         for letter in reversed(number):

@@ -33,11 +33,8 @@ class Window(Protocol):
 def open_window(cartpole: CartPole, camera: str = DEFAULT_CAMERA) -> Window:
     """Open a window, or say why there is none and go on without.
 
-    A program that was written for a desk should still run on a server.
-
-    Args:
-        cartpole: What to show.
-        camera: The camera that the window starts with; the viewer's own if there is no such one.
+    A program that was written for a desk should still run on a server. Without a camera of that
+    name the window starts with the viewer's own.
     """
     # MuJoCo's viewer ends the whole process where GLFW does not work. On macOS MuJoCo draws
     # without GLFW, so that a trial would say nothing; its viewer refuses by itself there.

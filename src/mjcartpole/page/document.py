@@ -47,14 +47,10 @@ _SHELL: Final = """<!doctype html>
 
 
 def page_html(runs: Sequence[Mapping[str, Any]], assets: Path = ASSETS) -> str:
-    """Return the page of runs, whole.
+    """Return the page of runs, whole, of what `run_data` returns of each.
 
     Nothing of a run is written as HTML but the title, escaped: the rest is JSON in which no `<` is
     left. The page may run this very script, and WebAssembly, and may load nothing at all.
-
-    Args:
-        runs: What `run_data` returns of each.
-        assets: The folder of what was built.
 
     Raises:
         ConfigError: Nothing was built.

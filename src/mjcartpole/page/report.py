@@ -38,11 +38,7 @@ img-src data:; base-uri 'none'; form-action 'none'">
 def report_html(name: str, head: str, sections: Sequence[Section], svg: str = "") -> str:
     """Return a report as a page; of all that it shows nothing is taken for HTML.
 
-    Args:
-        name: The study's.
-        head: What is said of all of it.
-        sections: A measure each.
-        svg: A plot; empty if there is none.
+    It has the study's name, what is said of all of it, a measure each, and a plot if there is one.
     """
     parts = [_element("h1", name), _element("p", head)]
     if svg:

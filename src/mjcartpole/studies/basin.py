@@ -31,13 +31,9 @@ def basin(
     at: Mapping[str, float] | None = None,
     points: int = POINTS,
 ) -> Grid:
-    """Return how long episodes last from starts over two dimensions, the others held.
+    """Return how long episodes last from so many starts along each of two dimensions.
 
-    Args:
-        setup: The policy and where it is played.
-        dims: See `choose_axes`.
-        at: See `choose_axes`.
-        points: Starts along each dimension.
+    For `dims`, and for the others, which are held, see `choose_axes`.
 
     Raises:
         ConfigError: There is no such dimension, or the points make no sense.

@@ -112,10 +112,8 @@ class Film:
     def __init__(self, casts: Sequence[Sequence[Rollout]], look: VideoOptions) -> None:
         """Open a renderer for each stage; several are shown side by side.
 
-        Args:
-            casts: The takes of each stage, as many of each, one after the other in time: each
-                starts when all that are shown beside the one before have ended.
-            look: How it looks.
+        The casts are the takes of each stage, as many of each, one after the other in time: each
+        starts when all that are shown beside the one before have ended.
 
         Raises:
             RenderError: The look makes no sense for a model.

@@ -18,12 +18,7 @@ def finish_training(
 ) -> tuple[TrainResult, dict[str, Any], Evaluation | None]:
     """Write what a training has come to and, if it is over, how well its policy plays.
 
-    Args:
-        session: The training, over or stopped.
-        folder: Its run folder.
-        cartpole: The model that the folder stores.
-        preset: Name of the preset that the config began from.
-        events: Write TensorBoard events as well.
+    The run folder stores the model; TensorBoard events are written as well if asked for.
 
     Returns:
         The result, the summary as it was written, and the evaluation; None if it is not over.

@@ -80,19 +80,12 @@ class SeedRunner:
         events: bool = False,
         allow_assets: tuple[Path, ...] = (),
     ) -> None:
-        """Plan the work.
+        """Plan the work: these seeds, or so many from the config's own on, for the config's model.
 
-        Args:
-            config: What to train.
-            seeds: Which seeds; a number stands for that many from the config's own seed on.
-            cartpole: The config's model.
-            workers: How many at once; as many as there are cores if left out.
-            engine: Who runs the loop.
-            folder: Keeps a run per seed in here, `seed-<n>`; runs that are there go on.
-            preset: Name of the preset that the config began from.
-            every: Seconds between two checkpoints of a run.
-            events: Write TensorBoard events for each run.
-            allow_assets: Folders in which the files of the models of runs that go on may lie.
+        The folder keeps a run per seed, `seed-<n>`; those that are there go on, and the files of
+        their models may also lie in `allow_assets`. Without `workers`, as many are at work at once
+        as there are cores. A checkpoint is saved after `every` so many seconds, and TensorBoard
+        events if they are asked for.
 
         Raises:
             ConfigError: The seeds or workers make no sense.
@@ -190,10 +183,7 @@ def _result_of(future: Future[SeedResult], seed: int) -> SeedResult:
 def train_seed(job: SeedJob, stop: Stop, cartpole: CartPole | None = None) -> SeedResult:
     """Return what a seed comes to; nothing, if it is to stop before it is done.
 
-    Args:
-        job: What is to be trained.
-        stop: Says when to stop.
-        cartpole: The job's model, if it is loaded already.
+    The job's model is given if it is loaded already.
     """
     seed = job.config.seed
     if stop():

@@ -118,9 +118,7 @@ def begin_seeds(
 def resumed_seeds(folder: Path, allow_assets: Sequence[Path] = ()) -> Iterator[ManyBegun]:
     """Hold a folder of many seeds whose work is to be continued.
 
-    Args:
-        folder: The folder.
-        allow_assets: Other folders in which the files of its model may lie.
+    The files of its model lie there, or in `allow_assets`.
 
     Raises:
         RunError: It is damaged, or another training is at work in it.

@@ -41,14 +41,8 @@ def performance_profile(
     """Return the run-score distribution of Agarwal et al. 2021 (arXiv:2108.13264), section 4.2.
 
     F(t) is the share of runs with a score above t, as a mean over tasks; its interval is that of
-    the stratified bootstrap, for each threshold by itself.
-
-    Args:
-        scores: Shape (n,) or (n, m).
-        thresholds: Where to look.
-        confidence: See `bootstrap_interval`.
-        resamples: See `bootstrap_interval`.
-        seed: See `bootstrap_interval`.
+    the stratified bootstrap, for each threshold by itself. Scores, shape (n,) or (n, m), and
+    settings are as in `bootstrap_interval`.
 
     Raises:
         ConfigError: The scores are empty, not finite or of another shape.
@@ -92,12 +86,8 @@ def variance_shares(
     its cells explain beyond both. On a full grid with as many runs in each cell the shares, with
     those of more than two factors and of seeds, add up to 1; elsewhere they overlap.
 
-    Args:
-        scores: Shape (n,).
-        factors: The level of each score, counted from 0, by factor; shape (n,).
-
-    Returns:
-        Shares by the names of a factor or of a pair; all 0 where the scores do not vary.
+    A factor has the level of each score, counted from 0; both have the shape (n,). Shares go by the
+    names of a factor or of a pair, and are all 0 where the scores do not vary.
 
     Raises:
         ConfigError: The scores are empty or not finite, or labels do not fit them.

@@ -66,12 +66,10 @@ def _records(folder: Path) -> Iterator[Record]:
 def curves_of(
     groups: Sequence[Group], *, window: int | None = None, average: Average = "mean"
 ) -> Curves:
-    """Return the learning curves of runs.
+    """Return the learning curves of runs by name; several under one name are seeds of one config.
 
-    Args:
-        groups: Runs by name; several under one name are seeds of one config.
-        window: Episodes of the running mean; a fortieth of the longest run if left out.
-        average: What many seeds are drawn as, beside its 95 % bootstrap interval.
+    The window is the episodes of the running mean, a fortieth of the longest run if left out; many
+    seeds are drawn as an average, beside its 95 % bootstrap interval.
 
     Raises:
         ConfigError: The window is no whole number from 1 up.
@@ -106,14 +104,10 @@ def line_of_seeds(
     average: Average = "mean",
     greedy: Sequence[tuple[int, float]] = (),
 ) -> Line:
-    """Return the curve of many seeds; where some are over, that of those that are not.
+    """Return the curve of one seed or many; where some are over, that of those that are not.
 
-    Args:
-        name: What a person calls them.
-        returns: Of each seed's episodes; at least one.
-        window: Episodes of the running mean.
-        average: What is drawn, beside its 95 % bootstrap interval.
-        greedy: Training episodes before greedy evaluations, and their mean over the seeds.
+    The running mean of their returns is over so many episodes; it is averaged as in `curves_of`.
+    `greedy` has training episodes before greedy evaluations, and their mean over the seeds.
     """
     lengths = np.array([len(each) for each in returns])
     window = min(window, int(lengths.max()))

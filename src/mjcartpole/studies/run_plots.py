@@ -77,10 +77,7 @@ def curve(
 ) -> Curves:
     """Return learning curves; runs that differ by their seed alone are one line with a band.
 
-    Args:
-        folders: Run folders, and folders of many seeds.
-        window: Episodes of the running mean; a fortieth of the longest run if left out.
-        average: What many seeds are drawn as, beside its 95 % bootstrap interval.
+    The folders are those of runs, and of many seeds. For the rest see `curves_of`.
 
     Raises:
         RunError: A run is damaged, or no episode of it is finished.
@@ -98,15 +95,9 @@ def table(
     shown: Sequence[Kind] = SHOWN,
     visits: npt.NDArray[np.int64] | None = None,
 ) -> Grid:
-    """Return slices of a table: greedy action, advantage and visits.
+    """Return slices of a table: greedy action, advantage and visits, a row for each that is shown.
 
-    Args:
-        setup: Whose; `find_setup` makes one of a run folder or a policy file.
-        dims: See `choose_axes`.
-        over: See `choose_axes`.
-        at: See `choose_axes`.
-        shown: What: a row each.
-        visits: As `read_visits` gives them.
+    For `dims`, `over` and `at` see `choose_axes`; visits are as `read_visits` gives them.
 
     Raises:
         ConfigError: There is no such dimension, or one is asked for twice.
@@ -134,11 +125,8 @@ def phase(
 ) -> Grid:
     """Return greedy episodes in a plane, over the action that the table has there.
 
-    Args:
-        setup: The policy and where it is played.
-        dims: See `choose_axes`.
-        at: See `choose_axes`; the episodes themselves are not held.
-        episodes: How many: the first that an evaluation with the same seed plays.
+    They are the first that an evaluation with the same seed plays. For `dims` and `at` see
+    `choose_axes`; the episodes themselves are not held.
 
     Raises:
         ConfigError: There is no such dimension, or no episode.
@@ -170,11 +158,9 @@ def phase(
 
 
 def endings(folders: Iterable[Path], *, episodes: int = EPISODES) -> EndingsPlot:
-    """Return how episodes ended along trainings, and how those of the greedy policies do.
+    """Return how episodes ended along trainings, and how so many of the greedy policies do.
 
-    Args:
-        folders: Run folders, and folders of many seeds.
-        episodes: Greedy episodes of each policy.
+    The folders are those of runs, and of many seeds.
 
     Raises:
         RunError: A run is damaged, or no episode of it is finished.

@@ -76,12 +76,7 @@ class Aggregate:
 
 
 def aggregate(scores: npt.ArrayLike, *, solved_at: float | None, seed: int = 0) -> Aggregate:
-    """Sum up the scores of several runs.
-
-    Args:
-        scores: Shape (n,) or (n, m).
-        solved_at: A score from here up counts as solved.
-        seed: Seeds the bootstrap.
+    """Sum up the scores of several runs, shape (n,) or (n, m); from `solved_at` up one is solved.
 
     Raises:
         ConfigError: The scores are empty, not finite or of another shape, or a setting makes no
@@ -107,9 +102,7 @@ def iqm(scores: npt.ArrayLike) -> float:
     With k scores in all, the lowest and the highest int(k / 4) are dropped, whole scores only: 4
     to 7 scores lose one at each end, fewer lose none. rliable does so (`scipy.stats.trim_mean`);
     weighting the scores at the cut by fractions would give other numbers than the published ones.
-
-    Args:
-        scores: Shape (n,) or (n, m); tasks are pooled.
+    Scores have the shape (n,) or (n, m); tasks are pooled.
 
     Raises:
         ConfigError: The scores are empty, not finite or of another shape.
@@ -143,12 +136,8 @@ def bootstrap_interval(
     interval of the IQM holds the true one in 74 % of all cases with 3 runs, 90 % with 5, 94 % with
     10 or 20. Runs that all score the same leave it no width at all.
 
-    Args:
-        scores: Shape (n,) or (n, m).
-        statistic: From a resample, of the same shape as `scores`, to a finite number.
-        confidence: Between 0 and 1, both excluded.
-        resamples: How often to draw, at least 1.
-        seed: The same seed gives the same interval.
+    Scores have the shape (n,) or (n, m), and the statistic takes a resample of that shape. The
+    confidence lies between 0 and 1, both excluded; the same seed gives the same interval.
 
     Raises:
         ConfigError: The scores are empty, not finite or of another shape, a setting makes no
@@ -169,14 +158,8 @@ def bootstrap_band(
 ) -> tuple[Array, Array, Array]:
     """Return the average of runs at each point of their curves, and its percentile interval there.
 
-    Whole runs are drawn; the interval holds for each point by itself.
-
-    Args:
-        curves: Shape (runs, points).
-        average: The mean, or the interquartile mean.
-        confidence: See `bootstrap_interval`.
-        resamples: See `bootstrap_interval`.
-        seed: See `bootstrap_interval`.
+    Whole runs are drawn; the interval holds for each point by itself. Curves have the shape
+    (runs, points); for the settings see `bootstrap_interval`.
 
     Raises:
         ConfigError: The curves are empty or not finite.
@@ -191,12 +174,9 @@ def bootstrap_band(
 
 
 def _trimmed(values: Array, counts: npt.NDArray[np.int64], cut: int) -> Array:
-    """Return the mean of each column without so many values at either end, shape (draws, points).
+    """Return the mean of each column without `cut` values at either end, shape (draws, points).
 
-    Args:
-        values: Shape (runs, points).
-        counts: How often each run was drawn, shape (draws, runs).
-        cut: How many.
+    Values have the shape (runs, points); counts say how often each run was drawn, (draws, runs).
     """
     n = len(values)
     if not cut:
@@ -219,11 +199,7 @@ def probability_of_improvement(x: npt.ArrayLike, y: npt.ArrayLike) -> float:
     """Return how likely a run of X scores higher than one of Y on the same task, over all tasks.
 
     P(X > Y) + P(X = Y) / 2 over all pairs of runs: the Mann-Whitney U divided by n_x n_y; 0.5 says
-    that neither is ahead.
-
-    Args:
-        x: Scores of X, shape (n_x,) or (n_x, m).
-        y: Scores of Y, shape (n_y,) or (n_y, m).
+    that neither is ahead. Scores have the shapes (n_x,) and (n_y,), or (n_x, m) and (n_y, m).
 
     Raises:
         ConfigError: Scores are empty, not finite, or of shapes that do not fit.

@@ -171,20 +171,9 @@ def sweep(
 ) -> SweepResult:
     """Play every policy on a model at each value of one of its parameters, or of a disturbance.
 
-    Args:
-        policies: By name; see `transfer`.
-        model: What is edited; see `load_model`. Disturbances may also be those of "gym".
-        key: What is changed: an edit, see `edit_document`; or one of `DISTURBANCES`, or shoves at
-            a time, such as push@2s.
-        values: Rising.
-        edits: What else is changed, at all values; see `load_model`.
-        integrator: See `Simulation`.
-        own_timestep: See `load_model`.
-        task: The rules, or their name.
-        disturbances: What is added besides, at all values.
-        episodes: Greedy episodes for each policy and value.
-        seed: Seeds the starting states and the bootstrap.
-        workers: How many at once; as many as there are cores if left out.
+    The key is an edit (see `edit_document`), one of `DISTURBANCES`, or shoves at a time, such as
+    push@2s; its values rise. `edits` and disturbances are what else is changed, at all values; the
+    latter may also be swept on "gym". All else is as in `transfer` and `load_model`.
 
     Raises:
         ConfigError: The key names nothing that is there, a value is outside physics, or a number

@@ -178,12 +178,8 @@ def find_place(
 ) -> Place:
     """A model as a place, with some things in it changed; `"gym"` is gymnasium's CartPole-v1.
 
-    Args:
-        model: See `load_model`, or `"gym"`, which no edit changes.
-        edits: See `load_model`.
-        integrator: See `Simulation`; gymnasium's keeps its own.
-        own_timestep: See `load_model`; gymnasium's keeps its own.
-        disturbances: What is added; gymnasium's model does not vary.
+    For the model and its changes see `load_model`, for the integrator `Simulation`: gymnasium's
+    keeps its own, takes no edits, and does not vary.
 
     Raises:
         ModelError: The model cannot be used; the message names it.
@@ -213,16 +209,11 @@ def transfer(
     """Play every policy at every place.
 
     All cells see the same starting states, so that their differences are those of policies and
-    models. The same seed gives the same result, whatever the number of workers.
+    models. The same seed gives the same result, whatever the number of workers: as many cells at
+    once as there are cores if left out.
 
-    Args:
-        policies: By name; several under one name are one learner's, from several seeds.
-        places: Places, or what `find_place` takes.
-        task: The rules, or their name.
-        disturbances: What is added; a `Place` has its own.
-        episodes: Greedy episodes per cell.
-        seed: Seeds the starting states and the bootstrap.
-        workers: How many cells at once; as many as there are cores if left out.
+    Several policies under one name are one learner's, from several seeds. A place may be what
+    `find_place` takes, and then has the disturbances.
 
     Raises:
         ConfigError: There is no policy or place, a number or a disturbance makes no sense, or a

@@ -74,12 +74,7 @@ class VideoOptions:
             )
 
     def places(self, states: int, control_step: float = CONTROL_STEP) -> npt.NDArray[np.float64]:
-        """Return where in an episode each frame lies, in control steps.
-
-        Args:
-            states: How many the episode has.
-            control_step: Seconds from one to the next.
-        """
+        """Return where in an episode of so many states each frame lies, in control steps."""
         from mjcartpole.media.montage import last_seconds, played  # noqa: PLC0415 - Pillow
 
         # Played as it was, a film has a frame per control step of 0.02 s at 50 frames per second.

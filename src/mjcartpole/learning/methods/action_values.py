@@ -141,12 +141,8 @@ def greedy_values(memory: Any) -> npt.NDArray[np.float64]:
 def choose(p: Any, q: Table, s: int, epsilon: float, rng: np.random.Generator) -> int:
     """Return an action: random with probability epsilon, else the better one.
 
-    Args:
-        p: With `ties`: 0 takes the first of two equal actions, 1 draws one.
-        q: Action values.
-        s: The state.
-        epsilon: Probability of a random action.
-        rng: Gives one number, and one more for a random action.
+    `p.ties` 0 takes the first of two equal actions, 1 draws one; `rng` gives one number, and one
+    more for a random action.
     """
     if rng.random() < epsilon:
         return int(rng.random() * N_ACTIONS)

@@ -42,15 +42,6 @@ def check_limits(memory: Any, grid: Discretizer) -> None:
 
 
 def refuse(name: str, why: str, found: Any) -> None:
-    """Refuse a field if anything was found.
-
-    Args:
-        name: The field.
-        why: What is wrong with it.
-        found: Whether it is so, or an array of that.
-
-    Raises:
-        ValueError: See above.
-    """
+    """Raise ValueError for a field, and why, if anything was found: True, or an array with one."""
     if np.any(found):
         raise ValueError(f"{name} {why}")

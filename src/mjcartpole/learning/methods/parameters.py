@@ -53,21 +53,16 @@ class Parameters:
 def numbers_class(parameters: type[Parameters], module: str) -> Any:
     """Return the NamedTuple of a method's parameters, as its functions see them, and `tiles`.
 
-    Args:
-        parameters: The dataclass.
-        module: The method's `__name__`: Numba keeps compiled code under `<module>.Numbers`.
+    The module is the method's `__name__`: Numba keeps compiled code under `<module>.Numbers`.
     """
     names = [field.name for field in dataclasses.fields(parameters)]
     return collections.namedtuple("Numbers", [*names, "tiles"], module=module)
 
 
 def numbers_of(parameters: Any, numbers: Any, tiles: Any = None) -> Any:
-    """Return parameters as numbers: of a choice its place, and -1 for None.
+    """Return parameters, or what has their fields, as numbers: of a choice its place, -1 for None.
 
-    Args:
-        parameters: A `Parameters`, or a dataclass that has its fields.
-        numbers: What `numbers_class` made.
-        tiles: The `Tiles` that a table consists of; None: it is one grid.
+    `numbers` is what `numbers_class` made; `tiles` are those of a table, None if it is one grid.
     """
     kinds = {field.name: field.type for field in dataclasses.fields(parameters)}
     names = (name for name in numbers._fields if name != "tiles")

@@ -104,9 +104,7 @@ def nodes_of(discretizer: Discretizer) -> Vector:
 def around(discretizer: Discretizer, states: Vector) -> tuple[npt.NDArray[np.int32], Vector]:
     """Return rows and weights of the nodes around each state, both of shape (n, 2^d).
 
-    Args:
-        discretizer: Of nodes; d is how many of its dimensions have more than one.
-        states: Shape (n, dimensions).
+    States have the shape (n, dimensions), of which d have more than one node.
     """
     rows, weights = np.zeros((len(states), 1), np.int32), np.ones((len(states), 1))
     for axis in discretizer.grid.dimensions:

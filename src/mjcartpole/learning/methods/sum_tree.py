@@ -17,16 +17,9 @@ def make_tree(leaves: int) -> npt.NDArray[np.float64]:
 
 
 def check_tree(name: str, tree: npt.NDArray[np.float64], used: int, largest: float) -> None:
-    """Refuse a tree that contradicts itself.
+    """Refuse a tree that contradicts itself, by its name (ValueError).
 
-    Args:
-        name: What it is called.
-        tree: The tree.
-        used: Its first leaves, which have a weight; the others have none.
-        largest: No weight is above this.
-
-    Raises:
-        ValueError: See above.
+    Its first `used` leaves have a weight, the others none; no weight is above the largest.
     """
     half = len(tree) // 2
     leaves, pairs = tree[half:], tree[2:].reshape(-1, 2)
@@ -57,10 +50,7 @@ def weight_of(tree: FloatMemory, leaf: int) -> float:
 def find_leaf(tree: FloatMemory, sum_before: float, used: int) -> int:
     """Return the leaf in whose weight a sum over all, from the first on, comes to lie.
 
-    Args:
-        tree: The tree.
-        sum_before: What lies before, in its leaves from the first on.
-        used: How many of the first leaves have a weight: rounding may lift the sum above all.
+    It is one of the first `used` leaves, which have a weight: rounding may lift the sum above all.
     """
     node, half = 1, len(tree) // 2
     while node < half:

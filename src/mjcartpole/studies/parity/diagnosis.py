@@ -36,11 +36,8 @@ def likely_cause(
 ) -> str:
     """Return what best explains a wrong answer, in words: the fewest changes that do.
 
-    Args:
-        subject: What is examined.
-        predict: See `Predict`.
-        found: What was measured.
-        beyond: What acts and is not in the equations; the subject's own list if None.
+    What was found is held against what `predict` says of parameters; what acts `beyond` the
+    equations is the subject's own list if None.
     """
     base = predict(subject.reference)
     total = float(np.sum((found - base) ** 2))

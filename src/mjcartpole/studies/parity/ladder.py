@@ -38,11 +38,7 @@ def check_rungs(rungs: Sequence[int]) -> None:
 
 
 def run_ladder(subject: Subject, rungs: Sequence[int] = tuple(RUNGS)) -> Iterator[Result]:
-    """Climb: one result per rung, as it is found.
-
-    Args:
-        subject: The model, and the question.
-        rungs: Which; each gives the same alone as among others.
+    """Climb: yield one result per rung, as it is found; each is the same alone as among others.
 
     Raises:
         ConfigError: There is no such rung.

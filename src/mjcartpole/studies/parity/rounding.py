@@ -27,11 +27,8 @@ def acceleration_scale(
     makes of it, the hinge's inertia included. And it adds up what the velocities do to the angular
     momentum, of which the rotation's own part and the cart's cancel.
 
-    Args:
-        p: The cart-pole.
-        states: Shape (n, 4).
-        forces: N, shape (n,).
-        offset: From the world's origin to the cart at x = 0, m.
+    States have the shape (n, 4), forces, N, the shape (n,); the offset is that of the cart at x = 0
+    from the world's origin, m.
     """
     k = coefficients(p)
     x, x_dot, _, theta_dot = np.abs(states).T

@@ -34,10 +34,8 @@ def same_distribution(a: Sequence[int], b: Sequence[int]) -> float:
 def same_frequencies(counts: npt.NDArray[np.int64]) -> float:
     """Return p of the chi-squared test that both rows fall into up to three columns alike.
 
-    With two columns Yates's correction is made (1934, doi:10.2307/2983604).
-
-    Args:
-        counts: Shape (2, columns).
+    Counts have the shape (2, columns). With two columns Yates's correction is made (1934,
+    doi:10.2307/2983604).
     """
     seen = counts[:, counts.sum(axis=0) > 0]
     if seen.shape[1] < 2:

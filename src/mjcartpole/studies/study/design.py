@@ -87,13 +87,9 @@ class Factor:
 def points_of(factors: Sequence[Factor], design: Design, samples: int, seed: int) -> list[Point]:
     """Return the points of a design, each once.
 
-    Args:
-        factors: What differs.
-        design: grid: every combination of levels. random: drawn independently; more samples keep
-            those before. latin: a Latin hypercube (McKay, Beckman and Conover 1979,
-            doi:10.2307/1268522), which spreads the levels of each factor evenly.
-        samples: How many of a random design or a Latin one.
-        seed: Seeds these.
+    grid: every combination of levels. random: so many samples, drawn independently by a seed; more
+    samples keep those before. latin: a Latin hypercube (McKay, Beckman and Conover 1979,
+    doi:10.2307/1268522) of as many, which spreads the levels of each factor evenly.
 
     Raises:
         ConfigError: There are too many.

@@ -107,12 +107,8 @@ def do_run(
 ) -> Record | None:
     """Train, and return what it came to; None if it was to stop, or has no memory here.
 
-    Args:
-        key: See `PlannedRun`.
-        job: What is to be trained.
-        tested: Under which disturbances greedy episodes are played besides, if any.
-        stop: Says when to stop.
-        cartpole: The model, if it is loaded already; it is this run's own.
+    Greedy episodes are played besides under the disturbances under which it is tested, if any. The
+    job's model is given if it is loaded already, and is this run's own.
     """
     found = train_seed(job, stop, cartpole)
     result = found.result

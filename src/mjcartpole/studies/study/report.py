@@ -72,12 +72,7 @@ class Section:
 
 
 def sections(results: Results, baseline: dict[str, str]) -> list[Section]:
-    """Return what a study says of each measure.
-
-    Args:
-        results: What it has come to.
-        baseline: The level of each factor that others are held against.
-    """
+    """Return what a study says of each measure; levels are held against those of the base line."""
     return [_section(results, measure, baseline) for measure in results.study.measure]
 
 

@@ -15,13 +15,9 @@ _LATEX: Final = {
 
 
 def markdown(name: str, head: str, sections: Sequence[Section], plot: str = "") -> str:
-    """Return a report as Markdown.
+    """Return a report as Markdown: a study's name, what is said of all of it, a measure each.
 
-    Args:
-        name: The study's.
-        head: What is said of all of it.
-        sections: A measure each.
-        plot: The file of a plot beside it; empty if there is none.
+    The plot is the name of its file beside it; empty if there is none.
     """
     parts = [f"# {_plain(name)}", _plain(head)]
     parts += [f"![]({plot})"] if plot else []

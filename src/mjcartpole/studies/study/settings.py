@@ -91,12 +91,9 @@ def is_whole(name: str) -> bool:
 
 
 def config_of(settings: Mapping[str, Any], given: Mapping[str, Any], seed: int) -> TrainConfig:
-    """Return the config of a training.
+    """Return the config of a training with a seed.
 
-    Args:
-        settings: What holds for all; of these a method takes the fields that it has.
-        given: What this one has of its own, before the others.
-        seed: Its seed.
+    It has what was given for it alone, and of the settings for all the fields that its method has.
 
     Raises:
         ConfigError: They make no sense together.
