@@ -34,6 +34,6 @@ def missing(what: str, package: str) -> str:
 
 
 def check_installed(what: str, package: str, error: type[MjCartPoleError] = ConfigError) -> None:
-    """Refuse to go on, by an error, where a package is missing that something needs."""
+    """Raise an error, a `ConfigError` unless told otherwise, where something lacks a package."""
     if not is_installed(package):
         raise error(missing(what, package))

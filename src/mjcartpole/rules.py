@@ -31,13 +31,9 @@ RULES: Final = {name: name for name in Changes.__annotations__} | {
 
 
 def number_of(name: str, value: SupportsFloat | str, unit: str, *, is_limit: bool = False) -> float:
-    """Return the number that a rule is.
+    """Return a number that was given for a rule, by its name and unit.
 
-    Args:
-        name: What the rule is called.
-        value: What was given.
-        unit: What it counts.
-        is_limit: Whether it is more than 0, and may be infinite.
+    A limit is more than 0, and may be infinite.
 
     Raises:
         ConfigError: It is none.

@@ -25,7 +25,7 @@ class DisturbanceChanges(WorldDisturbances):
         return {name: value for name, value in values.items() if value not in (None, ())}
 
     def added_to(self, otherwise: Disturbances) -> Disturbances:
-        """Return disturbances that are otherwise these.
+        """Return the disturbances: those that are given here, and otherwise those that there are.
 
         Raises:
             ConfigError: One makes no sense.

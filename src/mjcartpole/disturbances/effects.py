@@ -95,7 +95,7 @@ def _remember(effects: Effects, memory: Numbers, action: float) -> None:
 
 
 def sense(effects: Effects, memory: Numbers, seen: Numbers, rng: np.random.Generator) -> None:
-    """Make what is seen of a state, as rules have it, in place; room for the actions is behind it."""
+    """Make what is seen of a state, as rules have it, in place; the last actions go behind it."""
     size, step = effects.size, int(memory[CLOCK])
     readings = QUEUE + effects.delay + effects.actions
     noise = effects.constants

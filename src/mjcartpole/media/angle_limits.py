@@ -89,8 +89,8 @@ class Fan:
 def box_corners(aabb: Points, position: Points, turn: Points) -> Points:
     """Corners in the world of boxes around geoms, shape (n, 8, 3).
 
-    The boxes are centre and half sizes in each geom's frame, shape (n, 6); the geoms have positions,
-    shape (n, 3), and rotation matrices, shape (n, 9).
+    Of each box, `aabb` has centre and half sizes in the geom's frame, shape (n, 6); the geoms have
+    positions, shape (n, 3), and rotation matrices, shape (n, 9).
     """
     local = aabb[:, None, :3] + _CORNERS * aabb[:, None, 3:]
     corners: Points = local @ turn.reshape(-1, 3, 3).transpose(0, 2, 1) + position[:, None]

@@ -56,8 +56,8 @@ def write_mp4(path: Path, frames: Iterator[Frame], fps: float) -> int:
     """Write frames as H.264 with 4:2:0 colours, with the index first; returns their number.
 
     PyAV itself and not imageio's plugin, which keeps the codec's options and the colours'
-    conversion to itself. Of pictures with odd sizes, all of one, the last row or column is lost; the
-    file's name needs no suffix.
+    conversion to itself. Pictures have one size, and lose their last row or column if that is odd;
+    the file's name needs no suffix.
 
     Raises:
         RenderError: The encoder fails.

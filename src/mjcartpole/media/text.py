@@ -39,7 +39,7 @@ class Lettering:
     def number(self, target: Pixels, number: str, colour: Colour = INK) -> None:
         """Write a number at the right end of a row; what has no room on the left is left out.
 
-        Digits stand in cells of equal width, so that nothing jumps from frame to frame. The row is of
+        Digits stand in cells of equal width, so that nothing jumps from frame to frame. The row is
         paper, shape (height, width, 3); any text will do, without kerning.
         """
         right = target.shape[1]

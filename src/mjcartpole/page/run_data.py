@@ -31,12 +31,9 @@ _GRID: Final = ("bins", "low", "high", "tilings", "mirror", "interpolated")
 
 
 def run_data(setup: PolicySetup, told: Told, backend: str) -> dict[str, Any]:
-    """Return all that the page needs of a policy that is played on MuJoCo.
+    """Return all that the page needs of a policy that is played on MuJoCo, and of its training.
 
-    Args:
-        setup: The policy, and where it is played; its first episode is recorded, undisturbed.
-        told: What is told of it.
-        backend: Where it was trained.
+    Its first episode where it is played is recorded, undisturbed.
 
     Raises:
         ConfigError: The policy is one for another number of poles, or looks at actions before.

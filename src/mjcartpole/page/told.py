@@ -58,12 +58,7 @@ class Told:
 
 
 def told_of(folder: Path, film: Path | None, *, plots: bool) -> Told:
-    """Return what is told of a run.
-
-    Args:
-        folder: The run's.
-        film: Its film.
-        plots: Whether to draw, which takes seconds and needs matplotlib.
+    """Return what is told of a run, and its film; plots take seconds, and need matplotlib.
 
     Raises:
         RunError: Something in it is damaged.
