@@ -35,10 +35,7 @@ class RuleChanges:
         return {name: getattr(self, name) for name in RULES}
 
     def applied_to(self, otherwise: Task) -> Task:
-        """Return the rules.
-
-        Args:
-            otherwise: Where no task is named.
+        """Return the task with what is changed of it; another one where none is named.
 
         Raises:
             ConfigError: There is no such task, or a rule makes no sense.

@@ -29,7 +29,7 @@ class Bar:
     """
 
     def __init__(self, doing: Callable[[], str], total: int = 0, unit: str = "") -> None:
-        """Say what is done at the moment, and how many of a unit are to be done; 0: nobody knows."""
+        """Say what is done at the moment, and how many of what are to be done; 0: nobody knows."""
         self.shown = sys.stderr.isatty() and os.environ.get("TERM") != "dumb"
         self.done, self.said = 0, ""
         self._doing, self._total, self._unit = doing, total, unit

@@ -84,7 +84,7 @@ class Chance(NamedTuple):
 
     @classmethod
     def of(cls, np_random: np.random.Generator, index: int = 0) -> "Chance":
-        """Return that of an environment, or of one of several by its index, that a generator starts.
+        """Return that of an environment, or one of several by its index, that a generator starts.
 
         It has a stream of its own from the same seed: episodes start as without disturbances.
 

@@ -61,9 +61,8 @@ def parse_ranges(ranges: object) -> tuple[Range, ...]:
     >>> parse_ranges({"pole.length": (0.5, 1.5)})[0].text
     'pole.length=0.5:1.5'
 
-    Args:
-        ranges: Texts such as "pole.length=0.5:1.5", or a mapping of names to two numbers, to two
-            numbers and "log", to more numbers to choose from, or to what stands behind the "=".
+    Texts are such as "pole.length=0.5:1.5"; a mapping has by name two numbers, two numbers and
+    "log", more numbers to choose from, or what stands behind the "=".
 
     Raises:
         ConfigError: One makes no sense, or two are of the same name.

@@ -46,13 +46,9 @@ def held_folder(folder: Path) -> Iterator[None]:
 
 @contextlib.contextmanager
 def locked_folder(folder: Path, *, make: bool = False) -> Iterator[None]:
-    """Keep other trainings out of a folder, for as long as this process lives.
+    """Keep other trainings out of a folder, made if need be, for as long as this process lives.
 
     What writers that were killed have left in it goes.
-
-    Args:
-        folder: Which.
-        make: Make it, if it is not there.
 
     Raises:
         RunError: Another training is at work in it, or its lock is none of ours.

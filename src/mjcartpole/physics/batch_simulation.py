@@ -48,13 +48,7 @@ class BatchSimulation:
         integrator: Integrator = "gym",
         threads: int | None = None,
     ) -> None:
-        """Prepare n simulations.
-
-        Args:
-            cartpole: What is simulated.
-            n: How many.
-            integrator: See `Simulation`.
-            threads: How many step; None for as many as pay.
+        """Prepare n simulations, stepped by so many threads; None: by as many as pay.
 
         Raises:
             ConfigError: The integrator is unknown.
@@ -104,11 +98,7 @@ class BatchSimulation:
         return int(self._batch.nthread)
 
     def set_models(self, cartpoles: Sequence[CartPole]) -> None:
-        """Let each simulation be of a model of its own, that differs by its numbers only.
-
-        Args:
-            cartpoles: One for each; what moves now stays where it is.
-        """
+        """Let each move by a model of its own, that differs by its numbers only, from where it is."""
         integrator = self._arguments[2]
         made = {id(each): stepping_model(each.model, integrator) for each in cartpoles}
         self._variants = list(cartpoles)
@@ -133,10 +123,7 @@ class BatchSimulation:
         self.state[ids] = states
 
     def step(self, controls: Vector) -> None:
-        """Advance one control step.
-
-        Args:
-            controls: Shape (n,).
+        """Advance one control step, by controls of shape (n,).
 
         Raises:
             SimulationError: MuJoCo gave up on a model.

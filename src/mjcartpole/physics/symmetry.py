@@ -32,15 +32,10 @@ _BEYOND: Final = 1.05
 def check_symmetric(
     cartpole: CartPole | None, integrator: Integrator = "gym", *, task: Task = CARTPOLE_V1
 ) -> None:
-    """Refuse a cart-pole, or rules, that tell left from right.
-
-    Args:
-        cartpole: The model; None for gymnasium's own, which is symmetric.
-        integrator: See `Simulation`.
-        task: The rules; a reward of theirs may look at the state.
+    """Refuse a cart-pole, or rules, that tell left from right; without a model it is gymnasium's own.
 
     Raises:
-        ConfigError: See above; says where they part.
+        ConfigError: They do; says where they part.
         SimulationError: The physics diverged.
     """
     states = _sampled(1 if cartpole is None else cartpole.poles, task)

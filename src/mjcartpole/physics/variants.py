@@ -57,12 +57,7 @@ def contexts_of(base: CartPole, disturbances: Disturbances) -> Contexts:
 def effects_on(
     cartpole: CartPole | None, disturbances: Disturbances, task: Task
 ) -> tuple[Effects, list[float]]:
-    """Return what disturbances do to a model, and the memory of an episode.
-
-    Args:
-        cartpole: The model; None on gymnasium's equations.
-        disturbances: What is added.
-        task: The rules.
+    """Return what disturbances do to a model, and the memory of an episode; None is gymnasium's.
 
     Raises:
         ConfigError: They make no sense here.

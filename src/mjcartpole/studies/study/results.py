@@ -73,10 +73,9 @@ class Results:
         return len(points) * len(asked.seeds) - len(self.seeds) - self.failed
 
     def baseline(self, given: Sequence[str]) -> dict[str, str]:
-        """Return the level of each factor that others are held against.
+        """Return the level of each factor that others are held against, some given as alpha=0.1.
 
-        Args:
-            given: Texts such as alpha=0.1; the study's own, or the first levels, if left out.
+        Of the others it is the study's own, or the first one.
 
         Raises:
             ConfigError: One is no level.
