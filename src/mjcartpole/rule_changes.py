@@ -35,7 +35,7 @@ class RuleChanges:
         return {name: getattr(self, name) for name in RULES}
 
     def applied_to(self, otherwise: Task) -> Task:
-        """Return the task with what is changed of it; another one where none is named.
+        """Return the rules: of the task that is named, or otherwise of another one, with these changes.
 
         Raises:
             ConfigError: There is no such task, or a rule makes no sense.

@@ -66,7 +66,7 @@ _UNITS: Final = {
 
 
 def checked(name: str, value: Any) -> float | Reward:  # noqa: ANN401 - whatever was given
-    """Return a rule as a task has it, by the name of its attribute; of a reward a function or a name.
+    """Return a rule, called by its attribute's name, as a task has it; a reward may have its name.
 
     Raises:
         ConfigError: It is none.

@@ -98,7 +98,7 @@ class BatchSimulation:
         return int(self._batch.nthread)
 
     def set_models(self, cartpoles: Sequence[CartPole]) -> None:
-        """Let each move by a model of its own, that differs by its numbers only, from where it is."""
+        """Let each go on by a model of its own that differs by its numbers only."""
         integrator = self._arguments[2]
         made = {id(each): stepping_model(each.model, integrator) for each in cartpoles}
         self._variants = list(cartpoles)

@@ -32,7 +32,7 @@ _BEYOND: Final = 1.05
 def check_symmetric(
     cartpole: CartPole | None, integrator: Integrator = "gym", *, task: Task = CARTPOLE_V1
 ) -> None:
-    """Refuse a cart-pole, or rules, that tell left from right; without a model it is gymnasium's own.
+    """Refuse a cart-pole (None: gymnasium's own), or rules, that tell left from right.
 
     Raises:
         ConfigError: They do; says where they part.
