@@ -35,7 +35,7 @@ class RuleChanges:
         return {name: getattr(self, name) for name in RULES}
 
     def applied_to(self, otherwise: Task) -> Task:
-        """Return the rules: of the task that is named, or otherwise of another one, with these changes.
+        """Return the rules: of the task that is named, or otherwise another one, with changes.
 
         Raises:
             ConfigError: There is no such task, or a rule makes no sense.

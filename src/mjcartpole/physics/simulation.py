@@ -247,7 +247,7 @@ def _state_of(
 
 
 def as_seen(simulation: Simulation, rules: task.Task) -> Callable[[float], State]:
-    """Return steps that give what rules look at: the worst of several poles, less any whole turns."""
+    """Return steps that give what rules look at: of several poles the worst, without turns."""
     step, is_one = simulation.step, simulation.cartpole.poles == 1
 
     def turn(control: float) -> State:
