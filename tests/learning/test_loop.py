@@ -10,7 +10,6 @@ import pytest
 from mjcartpole.envs.backend import make_env
 from mjcartpole.errors import SimulationError
 from mjcartpole.learning.config import TrainConfig
-from mjcartpole.learning.discretizer import Discretizer
 from mjcartpole.learning.loop import learn_episodes, play_episode
 from mjcartpole.learning.presets import PRESETS
 from mjcartpole.learning.training import Training
@@ -84,6 +83,7 @@ class Recorder:
 
     rng = None
     episodes = 9
+    discretizer = Discretizer((4,), (0.0,), (4.0,))
 
     def __init__(self):
         self.method = self
@@ -139,8 +139,7 @@ class ThreeSteps(gymnasium.Env):
 @pytest.mark.parametrize("terminates", [True, False])
 def test_what_a_method_is_taught(terminates):
     learner = Recorder()
-    grid = Discretizer((4,), (0.0,), (4.0,))
-    episodes = list(learn_episodes(ThreeSteps(terminates), learner, grid, range(5, 7)))
+    episodes = list(learn_episodes(ThreeSteps(terminates), learner, range(5, 7)))
     # Truncated is not terminated: the learner may bootstrap.
     steps = [
         (0, 1, 1.0, 1, False, False),
@@ -173,8 +172,7 @@ class Diverging(ThreeSteps):
 
 
 def test_diverging_physics_are_named_by_episode_and_step():
-    learner, grid = Recorder(), Discretizer((4,), (0.0,), (4.0,))
-    episodes = learn_episodes(Diverging(True), learner, grid, range(1_300, 1_400))
+    episodes = learn_episodes(Diverging(True), Recorder(), range(1_300, 1_400))
     assert next(episodes).number == 1_300
     with pytest.raises(SimulationError, match=r"^episode 1,302, step 2: the simulation diverged$"):
         next(episodes)

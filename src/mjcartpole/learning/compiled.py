@@ -17,7 +17,7 @@ from mjcartpole.errors import SimulationError
 from mjcartpole.integrator import Integrator
 from mjcartpole.learning import kernels
 from mjcartpole.learning.compiling import compiling
-from mjcartpole.learning.discretizer import Discretizer, Grid
+from mjcartpole.learning.discretizer import Grid
 from mjcartpole.learning.episodes import EpisodeLog
 from mjcartpole.learning.fitted import Fitted
 from mjcartpole.learning.kinds import Rules
@@ -91,7 +91,6 @@ class CompiledLoop:
     def learn(
         self,
         learner: Learner,
-        discretizer: Discretizer,
         env_rng: np.random.Generator,
         log: EpisodeLog,
         numbers: range,
@@ -113,7 +112,7 @@ class CompiledLoop:
         while number < numbers.stop:
             self._scratch.finished[0] = number
             try:
-                self._learn(learner, discretizer, env_rng, log, number, numbers.stop, chance)
+                self._learn(learner, env_rng, log, range(number, numbers.stop), chance)
             finally:
                 # A signal that came meanwhile is raised before `_run` can return anything.
                 number = int(self._scratch.finished[0])
@@ -124,29 +123,26 @@ class CompiledLoop:
     def compile(
         self,
         learner: Learner,
-        discretizer: Discretizer,
         env_rng: np.random.Generator,
         log: EpisodeLog,
         chance: Chance | None = None,
     ) -> None:
         """Compile what `learn` runs, or load it from the cache, and models; nothing is learned."""
         self._worlds.prepare()
-        self._learn(learner, discretizer, env_rng, log, 0, 0, chance)
+        self._learn(learner, env_rng, log, range(0), chance)
 
     def _learn(
         self,
         learner: Learner,
-        discretizer: Discretizer,
         env_rng: np.random.Generator,
         log: EpisodeLog,
-        start: int,
-        stop: int,
+        numbers: range,
         chance: Chance | None,
     ) -> None:
         kernel = kernels.learn_chunk(learner.method, self._task.reward)
         run: Callable[..., int] = functools.partial(_run, kernel)
-        grid, left = _arrays(discretizer.grid), self._chunk
-        for first, last in self._worlds.parts(start, stop):
+        grid, left = _arrays(learner.discretizer.grid), self._chunk
+        for first, last in self._worlds.parts(numbers.start, numbers.stop):
             arguments = (
                 self._worlds.physics(chance, first),
                 self._rules,
@@ -161,7 +157,11 @@ class CompiledLoop:
                 self._scratch,
             )
             run(*arguments)
-            run = _for_these(kernel, arguments) if first == start and self._worlds.vary else run
+            run = (
+                _for_these(kernel, arguments)
+                if first == numbers.start and self._worlds.vary
+                else run
+            )
             left -= int(log.storage.steps[first]) if self._worlds.vary and last > first else 0
             if self._scratch.finished[0] != last or left <= 0:
                 return

@@ -25,6 +25,7 @@ class Learner:
     """What learns in a training.
 
     Attributes:
+        discretizer: From observations to the method's states.
         method: The functions of the method.
         p: Its parameters as numbers.
         memory: A NamedTuple of flat arrays, which are changed in place.
@@ -42,12 +43,12 @@ class Learner:
         self.memory = self.method.make_memory(self.p, discretizer.n_rows, self.rng)
         self.visits = np.zeros(math.prod(discretizer.bins) * N_ACTIONS, np.int64)
         self.episodes = config.episodes
-        self._discretizer = discretizer
+        self.discretizer = discretizer
 
     def check(self, memory: dict[str, npt.NDArray[Any]]) -> None:
         """Refuse a memory that no training can have come to (ValueError; names the field)."""
         found = type(self.memory)(**memory)
-        check_limits(found, self._discretizer)
+        check_limits(found, self.discretizer)
         if hasattr(self.method, "check_memory"):
             self.method.check_memory(self.p, found)
 
@@ -58,7 +59,7 @@ class Learner:
 
     def plan(self, dynamics: Dynamics) -> None:
         """Learn from equations."""
-        self.method.plan(self.p, self.memory, self._discretizer, dynamics)
+        self.method.plan(self.p, self.memory, self.discretizer, dynamics)
 
     @property
     def dreams(self) -> bool:

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from mjcartpole.disturbances.contexts import Chance
 from mjcartpole.errors import SimulationError
-from mjcartpole.learning.discretizer import Discretizer, folded, row_of
+from mjcartpole.learning.discretizer import folded, row_of
 from mjcartpole.learning.episodes import ENDINGS, SIDES, Episode, ending_index, side_index
 from mjcartpole.learning.methods.experience import Trajectory, Transition
 from mjcartpole.learning.tiles import home
@@ -28,7 +28,6 @@ State = npt.NDArray[np.float64]
 def learn_episodes(
     env: gymnasium.Env[Any, Any],
     learner: "Learner",
-    discretizer: Discretizer,
     numbers: range,
 ) -> Iterator[Episode]:
     """Let a learner play and learn, one episode per item.
@@ -42,20 +41,19 @@ def learn_episodes(
     """
     for number in numbers:
         observation, _ = env.reset()
-        yield _learn_episode(env, learner, discretizer, observation, number)
+        yield _learn_episode(env, learner, observation, number)
 
 
 def _learn_episode(
     env: gymnasium.Env[Any, Any],
     learner: "Learner",
-    discretizer: Discretizer,
     observation: npt.NDArray[np.float32],
     number: int,
 ) -> Episode:
     method, p, rng, memory = learner.method, learner.p, learner.rng, learner.quick_memory()
     act, after_step, step = method.act, method.after_step, env.step
     rates = method.begin_episode(p, memory, number, learner.episodes)
-    grid, tiles, visits = discretizer.grid, p.tiles, learner.visits.data
+    grid, tiles, visits = learner.discretizer.grid, p.tiles, learner.visits.data
     row = row_of(observation.tolist(), grid)
     s, mirrored = folded(row, grid.folding)
     states, actions, rewards = [s], list[int](), list[float]()

@@ -209,9 +209,7 @@ class Training:
         run = self._run_compiled if self.engine == "compiled" else self._run_python
         self._imagine()
         if self.engine == "compiled":
-            self._loop.compile(
-                self.learner, self.discretizer, self._env_rng, self.log, self._chance
-            )
+            self._loop.compile(self.learner, self._env_rng, self.log, self._chance)
         self._plan()
         self._evaluate_if_due()
         started = time.perf_counter() - self._seconds
@@ -279,13 +277,11 @@ class Training:
         return True
 
     def _run_compiled(self, numbers: range) -> Iterator[int]:
-        return self._loop.learn(
-            self.learner, self.discretizer, self._env_rng, self.log, numbers, self._chance
-        )
+        return self._loop.learn(self.learner, self._env_rng, self.log, numbers, self._chance)
 
     def _run_python(self, numbers: range) -> Iterator[int]:
         lend(self._env, self._env_rng, self._chance, numbers.start)
-        for episode in learn_episodes(self._env, self.learner, self.discretizer, numbers):
+        for episode in learn_episodes(self._env, self.learner, numbers):
             self.log.append(episode)
             yield len(self.log)
 

@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from mjcartpole.physics.bodies import pole_bodies
 from mjcartpole.physics.cartpole import CartPole
+from mjcartpole.physics.structure import cross
 from mjcartpole.task import CARTPOLE_V1, Task
 
 Points = npt.NDArray[np.float64]
@@ -95,12 +96,6 @@ def box_corners(aabb: Points, position: Points, turn: Points) -> Points:
     local = aabb[:, None, :3] + _CORNERS * aabb[:, None, 3:]
     corners: Points = local @ turn.reshape(-1, 3, 3).transpose(0, 2, 1) + position[:, None]
     return corners
-
-
-def cross(a: Points, b: Points) -> Points:
-    """The cross product of two vectors; numpy's takes ten times as long for a single one."""
-    (ax, ay, az), (bx, by, bz) = a.tolist(), b.tolist()
-    return np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
 
 
 def _spans(limit: float) -> list[tuple[Points, npt.NDArray[np.float32]]]:

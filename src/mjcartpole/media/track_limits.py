@@ -10,9 +10,9 @@ from typing import Final
 import mujoco
 import numpy as np
 
-from mjcartpole.media.angle_limits import EDGE_RGBA, Points, Wedge, cross
+from mjcartpole.media.angle_limits import EDGE_RGBA, Points, Wedge
 from mjcartpole.physics.cartpole import CartPole
-from mjcartpole.physics.structure import directions
+from mjcartpole.physics.structure import cross, directions
 from mjcartpole.task import CARTPOLE_V1, Task
 
 _HALF_WIDTH: Final = 0.01
