@@ -10,6 +10,7 @@ import pytest
 from mjcartpole.envs.backend import make_env
 from mjcartpole.errors import SimulationError
 from mjcartpole.learning.config import TrainConfig
+from mjcartpole.learning.discretizer import Discretizer
 from mjcartpole.learning.loop import learn_episodes, play_episode
 from mjcartpole.learning.presets import PRESETS
 from mjcartpole.learning.training import Training

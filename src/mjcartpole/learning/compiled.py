@@ -157,12 +157,9 @@ class CompiledLoop:
                 self._scratch,
             )
             run(*arguments)
-            run = (
-                _for_these(kernel, arguments)
-                if first == numbers.start and self._worlds.vary
-                else run
-            )
-            left -= int(log.storage.steps[first]) if self._worlds.vary and last > first else 0
+            if self._worlds.vary:
+                run = _for_these(kernel, arguments) if first == numbers.start else run
+                left -= int(log.storage.steps[first]) if last > first else 0
             if self._scratch.finished[0] != last or left <= 0:
                 return
 
