@@ -7,8 +7,9 @@ from typing import Annotated, Any, Final, Literal
 import tyro
 
 from mjcartpole.commands.options import Command, OutputPath, UsageError
-from mjcartpole.errors import ConfigError
+from mjcartpole.errors import ConfigError, RenderError
 from mjcartpole.files import check_free, check_writable, csv_text, free_path, write_whole
+from mjcartpole.packages import check_installed
 
 PLOTS: Final = Path("plots")
 """Where plots go, unless told otherwise."""
@@ -61,12 +62,12 @@ class Plot(Command):
     def run(self) -> int:
         """Draw; all is checked before anything is read or played."""
         from mjcartpole.commands.policies import shown
-        from mjcartpole.media.plots import check_installed, write_plot
+        from mjcartpole.media.plots import write_plot
         from mjcartpole.physics.simulation import silence_mujoco
         from mjcartpole.studies.run_plots import OF_ONE, numbers
 
         silence_mujoco()
-        check_installed()
+        check_installed("a plot", "matplotlib", RenderError)
         options, path = self._options(), self._checked_path()
         one = self.kind in OF_ONE
         plot = numbers(

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from mjcartpole.commands.train_options import RunLocation, TrainOptions
 from mjcartpole.files import is_file
-from mjcartpole.learning import runs, tensorboard
+from mjcartpole.learning import runs
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.documents import CONFIG
 from mjcartpole.learning.naming import in_flags, namesakes
@@ -14,6 +14,7 @@ from mjcartpole.learning.run_model import check_storable
 from mjcartpole.learning.session import check_interval
 from mjcartpole.learning.training_grid import training_grid
 from mjcartpole.media import plots
+from mjcartpole.packages import check_installed
 from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.playable import why_unplayable
 from mjcartpole.physics.simulation import silence_mujoco
@@ -41,7 +42,7 @@ def check(how: TrainOptions) -> None:
     silence_mujoco()
     check_interval(how.checkpoint_every)
     if how.tensorboard:
-        tensorboard.check_writer()
+        check_installed("--tensorboard", "tensorboardX")
 
 
 def draw_curve(folder: Path, how: TrainOptions) -> None:

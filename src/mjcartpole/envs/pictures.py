@@ -8,8 +8,9 @@ from gymnasium import logger
 
 from mjcartpole.envs.registration import ENV_ID
 from mjcartpole.errors import ConfigError
-from mjcartpole.media.renderer import DEFAULT_HEIGHT, DEFAULT_WIDTH, Renderer, open_renderer
+from mjcartpole.media.renderer import DEFAULT_HEIGHT, DEFAULT_WIDTH, open_renderer
 from mjcartpole.media.scene import DEFAULT_CAMERA, check_picture
+from mjcartpole.media.turns import Renderer
 from mjcartpole.media.window import Window, open_window
 from mjcartpole.physics.bodies import starting_state
 from mjcartpole.physics.cartpole import CartPole

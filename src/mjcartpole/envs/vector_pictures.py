@@ -9,8 +9,9 @@ import numpy.typing as npt
 from mjcartpole.envs.disturbers import Disturbers
 from mjcartpole.envs.pictures import USUAL, warn_without_mode
 from mjcartpole.errors import ConfigError
-from mjcartpole.media.renderer import Renderer, open_renderer
+from mjcartpole.media.renderer import open_renderer
 from mjcartpole.media.scene import check_picture
+from mjcartpole.media.turns import Renderer
 from mjcartpole.physics.batch_simulation import BatchSimulation
 from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.task import Task

@@ -21,18 +21,13 @@ _ONE_STATE: Final = Discretizer((1,), (-1.0,), (1.0,))
 """No rates depend on what is learned, so there need be no table."""
 
 
-def check_writer() -> None:
-    """Refuse where the writer is missing (ConfigError)."""
-    check_installed("--tensorboard", "tensorboardX")
-
-
 def write_events(folder: Path, result: TrainResult) -> None:
     """Write returns, the method's rates and greedy means in place of events that are there.
 
     Raises:
         ConfigError: tensorboardX is not installed.
     """
-    check_writer()
+    check_installed("--tensorboard", "tensorboardX")
     # Not its SummaryWriter: that one writes in a thread of its own, and hangs on a full disk.
     from tensorboardX.proto.event_pb2 import Event  # noqa: PLC0415 - an optional package
     from tensorboardX.record_writer import RecordWriter  # noqa: PLC0415

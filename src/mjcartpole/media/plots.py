@@ -43,11 +43,6 @@ def is_installed() -> bool:
     return packages.is_installed("matplotlib")
 
 
-def check_installed() -> None:
-    """Refuse where matplotlib is missing (RenderError)."""
-    packages.check_installed("a plot", "matplotlib", RenderError)
-
-
 def css(colour: Colour) -> str:
     """Return a colour of the palette as matplotlib, and a page, name it.
 
@@ -78,7 +73,7 @@ def plot_style() -> Iterator[None]:
     Raises:
         RenderError: matplotlib is not installed.
     """
-    check_installed()
+    packages.check_installed("a plot", "matplotlib", RenderError)
     import matplotlib.style  # noqa: PLC0415 - an optional package
     from cycler import cycler  # noqa: PLC0415
 

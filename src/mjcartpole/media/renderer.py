@@ -2,8 +2,7 @@
 
 import sys
 from collections.abc import Callable
-from types import TracebackType
-from typing import Final, Literal, Protocol, Self, get_args
+from typing import Final, Literal, get_args
 
 import mujoco
 import numpy as np
@@ -14,7 +13,7 @@ from mjcartpole.media import gl
 from mjcartpole.media.backend_probe import Backend
 from mjcartpole.media.quality import DEFAULT_QUALITY, Quality
 from mjcartpole.media.scene import DEFAULT_CAMERA, Box, Scene
-from mjcartpole.media.turns import TakesTurns, drawing
+from mjcartpole.media.turns import Renderer, drawing
 from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.task import CARTPOLE_V1, Task
 
@@ -24,39 +23,6 @@ Kind = Literal["auto", "egl", "osmesa", "glfw", "sketch"]
 DEFAULT_WIDTH: Final = 640
 DEFAULT_HEIGHT: Final = 480
 """Pixels of a picture, unless told otherwise."""
-
-
-class Renderer(Protocol):
-    """Draws states; a context manager that closes itself at the end.
-
-    Any thread may use it; several at the same time take turns.
-
-    Attributes:
-        kind: Who draws: `"egl"`, `"osmesa"`, `"glfw"` or `"sketch"`.
-        scene: What was drawn last, and where it is in the picture.
-    """
-
-    kind: str
-    scene: Scene
-
-    def render(self, state: npt.ArrayLike) -> npt.NDArray[np.uint8]:
-        """Draw a state `(x, x_dot, theta, theta_dot, …)`; m, m/s, rad, rad/s.
-
-        Returns:
-            A new array of shape (height, width, 3), red, green, blue.
-        """
-
-    def close(self) -> None:
-        """Free what it holds; a second call does nothing."""
-
-    def __enter__(self) -> Self: ...
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None: ...
 
 
 def open_renderer(
@@ -121,16 +87,12 @@ def _open_by_name(scene: Scene, backend: Backend) -> "GLRenderer":
     return GLRenderer(scene, backend)
 
 
-class GLRenderer(TakesTurns):
+class GLRenderer(Renderer):
     """Draws with MuJoCo's own OpenGL renderer.
 
     On a CPU, time goes with pixels. Where camera and lights stand still, only the box around what
     moves is drawn for each frame, through a part of the camera's window; the rest comes from a
     picture made once.
-
-    Attributes:
-        kind: The OpenGL backend.
-        scene: What was drawn last.
     """
 
     def __init__(self, scene: Scene, backend: Backend) -> None:
@@ -139,9 +101,7 @@ class GLRenderer(TakesTurns):
         Raises:
             RenderError: The backend gives no context, or MuJoCo cannot draw into it.
         """
-        super().__init__()
-        self.kind: str = backend
-        self.scene = scene
+        super().__init__(backend, scene)
         self._whole: Box = (0, 0, scene.width, scene.height)
         self._has_background = scene.is_still and scene.is_local
         self._background: npt.NDArray[np.uint8] | None = None
@@ -164,18 +124,6 @@ class GLRenderer(TakesTurns):
             mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._drawing)
         finally:
             self._context.release()
-
-    def render(self, state: npt.ArrayLike) -> npt.NDArray[np.uint8]:
-        """Draw a state `(x, x_dot, theta, theta_dot, …)`; m, m/s, rad, rad/s.
-
-        Returns:
-            A new array of shape (height, width, 3), red, green, blue.
-
-        Raises:
-            RenderError: The renderer is closed, or it is no state.
-        """
-        with self.taking_turns():
-            return self._render(state)
 
     def _render(self, state: npt.ArrayLike) -> npt.NDArray[np.uint8]:
         if self._drawing is None:

@@ -16,43 +16,25 @@ from mjcartpole.errors import RenderError
 from mjcartpole.media.outlines import Outline, outline_of, outline_of_wedge
 from mjcartpole.media.pillow import Image, ImageDraw
 from mjcartpole.media.scene import Box, Scene
-from mjcartpole.media.turns import TakesTurns
+from mjcartpole.media.turns import Renderer
 
 _BLACK: Final = (0, 0, 0)
 _OPAQUE: Final = 255
 
 
-class SketchRenderer(TakesTurns):
+class SketchRenderer(Renderer):
     """Draws any cart-pole on any machine.
 
     It knows boxes, capsules, cylinders, spheres, ellipsoids, planes and (by their outline)
     meshes, the model's cameras, colours and lights; no shadows, reflections or textures.
-
-    Attributes:
-        kind: `"sketch"`.
-        scene: What was drawn last.
     """
 
     def __init__(self, scene: Scene) -> None:
-        super().__init__()
-        self.kind = "sketch"
-        self.scene = scene
+        super().__init__("sketch", scene)
         self._is_closed = False
         self._static: dict[int, Outline] = {}
         self._background: npt.NDArray[np.uint8] | None = None
         self._backdrop = _backdrop(scene.model)
-
-    def render(self, state: npt.ArrayLike) -> npt.NDArray[np.uint8]:
-        """Draw a state `(x, x_dot, theta, theta_dot, …)`; m, m/s, rad, rad/s.
-
-        Returns:
-            A new array of shape (height, width, 3), red, green, blue.
-
-        Raises:
-            RenderError: The renderer is closed, or it is no state.
-        """
-        with self.taking_turns():
-            return self._render(state)
 
     def _render(self, state: npt.ArrayLike) -> npt.NDArray[np.uint8]:
         scene = self.scene

@@ -15,17 +15,30 @@ from collections.abc import Iterator
 from types import TracebackType
 from typing import Final, Self
 
+import numpy as np
+import numpy.typing as npt
+
+from mjcartpole.media.scene import Scene
+
 _PATIENCE: Final = 10.0
 """Seconds that a driver has to finish a frame at exit."""
 _STEPS: Final = 0.3
 """Seconds for a thread to come from one frame to the next, so that it is held here at exit."""
 
 
-class TakesTurns(abc.ABC):
-    """Something that any thread may use, and one at a time does; closed at the end of a `with`."""
+class Renderer(abc.ABC):
+    """Draws states; a context manager that closes itself at the end.
 
-    def __init__(self) -> None:
+    Any thread may use it; several at the same time take turns.
+
+    Attributes:
+        kind: Who draws: `"egl"`, `"osmesa"`, `"glfw"` or `"sketch"`.
+        scene: What was drawn last, and where it is in the picture.
+    """
+
+    def __init__(self, kind: str, scene: Scene) -> None:
         """It is nobody's turn yet."""
+        self.kind, self.scene = kind, scene
         # A thread may come back to it: Python can call __del__ anywhere.
         self._turn = threading.RLock()
 
@@ -34,6 +47,22 @@ class TakesTurns(abc.ABC):
         """Keep other threads out, and the process alive, until this is done."""
         with drawing(), self._turn:
             yield
+
+    def render(self, state: npt.ArrayLike) -> npt.NDArray[np.uint8]:
+        """Draw a state `(x, x_dot, theta, theta_dot, …)`; m, m/s, rad, rad/s.
+
+        Returns:
+            A new array of shape (height, width, 3), red, green, blue.
+
+        Raises:
+            RenderError: The renderer is closed, or it is no state.
+        """
+        with self.taking_turns():
+            return self._render(state)
+
+    @abc.abstractmethod
+    def _render(self, state: npt.ArrayLike) -> npt.NDArray[np.uint8]:
+        """Do it, while nobody else does."""
 
     @abc.abstractmethod
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""The HTML file: one shell around what was built from web/, and the data of runs."""
+"""The HTML file: a shell around what was built from web/, and the data of runs."""
 
 import hashlib
 import html
@@ -32,18 +32,25 @@ _SHELL: Final = """<!doctype html>
 <meta name="viewport" content="width=device-width, initial-scale=1">
 <meta name="color-scheme" content="light dark">
 <meta name="referrer" content="no-referrer">
-<title>{title}</title>
+<title>{title} · mjcartpole</title>
 <style>{style}</style>
 </head>
 <body>
-<div id="app"><p class="loading">Starting MuJoCo …</p></div>
-<noscript>This page runs MuJoCo in the browser, which needs JavaScript.</noscript>
-<script type="application/json" id="data">{data}</script>
-<script type="application/octet-stream" id="wasm">{wasm}</script>
-<script>{script}</script>
+{body}
 </body>
 </html>
 """
+
+_BODY: Final = """<div id="app"><p class="loading">Starting MuJoCo …</p></div>
+<noscript>This page runs MuJoCo in the browser, which needs JavaScript.</noscript>
+<script type="application/json" id="data">{data}</script>
+<script type="application/octet-stream" id="wasm">{wasm}</script>
+<script>{script}</script>"""
+
+
+def shell(title: str, style: str, policy: str, body: str) -> str:
+    """Return an HTML file around a body: what a browser needs to know, and the title, escaped."""
+    return _SHELL.format(title=html.escape(title), style=style, policy=policy, body=body)
 
 
 def page_html(runs: Sequence[Mapping[str, Any]], assets: Path = ASSETS) -> str:
@@ -62,14 +69,13 @@ def page_html(runs: Sequence[Mapping[str, Any]], assets: Path = ASSETS) -> str:
         "runs": runs,
     }
     names = ", ".join(str(run["name"]) for run in runs)
-    return _SHELL.format(
-        policy=_POLICY.format(script=digest(script), style=digest(style)),
-        title=html.escape(f"{names} · mjcartpole"),
-        style=style.decode(),
+    body = _BODY.format(
         data=json.dumps(page).replace("<", "\\u003c"),
         wasm=in_base64(wasm),
         script=script.decode(),
     )
+    policy = _POLICY.format(script=digest(script), style=digest(style))
+    return shell(names, style.decode(), policy, body)
 
 
 def check_built(assets: Path = ASSETS) -> None:

@@ -4,7 +4,7 @@ import html
 from collections.abc import Sequence
 from typing import Final
 
-from mjcartpole.page.document import digest
+from mjcartpole.page.document import digest, shell
 from mjcartpole.page.run_data import in_base64
 from mjcartpole.studies.study.report import Section, Table
 
@@ -17,22 +17,9 @@ th, td { padding: 0.2rem 0.8rem; border-bottom: 1px solid #8888; text-align: rig
 th:first-child { text-align: left; }
 """
 
-_SHELL: Final = """<!doctype html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta http-equiv="Content-Security-Policy" content="default-src 'none'; style-src '{policy}'; \
-img-src data:; base-uri 'none'; form-action 'none'">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<meta name="color-scheme" content="light dark">
-<title>{title} · mjcartpole</title>
-<style>{style}</style>
-</head>
-<body>
-{body}
-</body>
-</html>
-"""
+_POLICY: Final = (
+    "default-src 'none'; style-src '{style}'; img-src data:; base-uri 'none'; form-action 'none'"
+)
 
 
 def report_html(name: str, head: str, sections: Sequence[Section], svg: str = "") -> str:
@@ -47,10 +34,7 @@ def report_html(name: str, head: str, sections: Sequence[Section], svg: str = ""
     for section in sections:
         parts += [_element("h2", section.measure), _element("p", section.sentence)]
         parts += map(_table, section.tables)
-    policy = digest(_STYLE.encode())
-    return _SHELL.format(
-        policy=policy, title=html.escape(name), style=_STYLE, body="\n".join(parts)
-    )
+    return shell(name, _STYLE, _POLICY.format(style=digest(_STYLE.encode())), "\n".join(parts))
 
 
 def _table(table: Table) -> str:

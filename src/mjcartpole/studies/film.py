@@ -18,7 +18,8 @@ from mjcartpole.learning.policy import Policy
 from mjcartpole.media.hud import Moment
 from mjcartpole.media.montage import equally_spaced, sheet, side_by_side, state_at, time_label
 from mjcartpole.media.overlay import Overlay
-from mjcartpole.media.renderer import Renderer, open_renderer
+from mjcartpole.media.renderer import open_renderer
+from mjcartpole.media.turns import Renderer
 from mjcartpole.studies.policy_setup import PolicySetup
 from mjcartpole.studies.video_options import VideoOptions
 from mjcartpole.task import worst_pole

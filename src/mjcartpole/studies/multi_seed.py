@@ -92,10 +92,8 @@ class SeedRunner:
         """
         self.seeds = check_seeds(config, seeds)
         self.workers = worker_count(workers, len(self.seeds))
-        on_mujoco = config.backend == "mujoco"
-        engine = choose_engine(engine, config.backend, cartpole if on_mujoco else None)
-        document = cartpole.xml if on_mujoco else None
-        self._job = SeedJob(config, engine, document, folder, preset, every, events, allow_assets)
+        by = chosen_for(config, cartpole, engine)
+        self._job = SeedJob(config, *by, folder, preset, every, events, allow_assets)
         self._found: dict[int, SeedResult] = {}
 
     def run(self, stop: Stop) -> Iterator[SeedResult | None]:
@@ -117,6 +115,14 @@ class SeedRunner:
         """Return the seeds that have come to something, in order."""
         found = tuple(self._found[seed] for seed in self.seeds if seed in self._found)
         return ManyResult(self._job.config, found)
+
+
+def chosen_for(
+    config: TrainConfig, cartpole: CartPole, engine: Engine
+) -> tuple[Engine, str | None]:
+    """Return for a `SeedJob` by which engine it is done, and the document of its model."""
+    its = cartpole if config.backend == "mujoco" else None
+    return choose_engine(engine, config.backend, its, config.rules), its.xml if its else None
 
 
 def train_many(

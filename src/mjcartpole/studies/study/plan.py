@@ -11,11 +11,11 @@ from mjcartpole.envs.backend import check_backend
 from mjcartpole.errors import ConfigError, ModelError
 from mjcartpole.learning.checkpoints import checksum
 from mjcartpole.learning.config import TrainConfig
-from mjcartpole.learning.engine import Engine, choose_engine
+from mjcartpole.learning.engine import Engine
 from mjcartpole.learning.run_model import check_storable
 from mjcartpole.learning.training_grid import training_grid
 from mjcartpole.physics.cartpole import CartPole
-from mjcartpole.studies.multi_seed import SeedJob
+from mjcartpole.studies.multi_seed import SeedJob, chosen_for
 from mjcartpole.studies.study.design import Point, points_of
 from mjcartpole.studies.study.measures import is_disturbed, plays_after, with_evaluations
 from mjcartpole.studies.study.settings import PRESET, as_text, config_of, is_edit
@@ -128,16 +128,14 @@ def _runs(
         models[where] = _Model.of(config)
     cartpole, digest = models[where].cartpole, models[where].digest
     training_grid(config, cartpole)
-    on_mujoco = config.backend == "mujoco"
-    chosen = choose_engine(engine, config.backend, cartpole if on_mujoco else None, config.rules)
-    document = cartpole.xml if on_mujoco else None
-    job = SeedJob(config, chosen, document, evaluated=plays_after(study.measure))
+    by, evaluated = chosen_for(config, cartpole, engine), plays_after(study.measure)
+    job = SeedJob(config, *by, evaluated=evaluated)
     tested = study.robustness if is_disturbed(study.measure) else None
     if tested:
         check_backend(config.backend, config.model, config.integrator, tested.vary)
     for seed in study.seeds:
         one = job.of(seed)
-        key = _key(one.config, digest if on_mujoco else "", tested)
+        key = _key(one.config, digest if job.document else "", tested)
         yield PlannedRun(key, number, point, one, cartpole, tested)
 
 
