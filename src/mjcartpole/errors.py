@@ -90,10 +90,7 @@ class RenderError(MjCartPoleError):
 
 
 def check_known(
-    kind: str,
-    name: object,
-    available: Iterable[object],
-    error: type[MjCartPoleError] = ConfigError,
+    kind: str, name: object, available: Iterable[object], error: type[MjCartPoleError] = ConfigError
 ) -> None:
     """Refuse a name that is none of those there are.
 

@@ -317,12 +317,7 @@ def load(
         limit = max(1, round(time_limit / cartpole.control_step))
     kind = functools.partial(DisturbedBalance, disturbances=added) if added.are_some else Balance
     balance = kind(
-        cartpole,
-        random=seed,
-        limit=limit,
-        discrete=discrete,
-        rules=task,
-        observation=observation,
+        cartpole, random=seed, limit=limit, discrete=discrete, rules=task, observation=observation
     )
     balance.visualize_reward = visualize_reward
     # Without dm_control's half steps, a step is one call of mj_step, whatever the solver.

@@ -44,10 +44,7 @@ class Number:
     """
 
     def __init__(
-        self,
-        read: Callable[[CartPole], Numbers],
-        edits: Edits | None = None,
-        how: str = "",
+        self, read: Callable[[CartPole], Numbers], edits: Edits | None = None, how: str = ""
     ) -> None:
         self.name, self.read, self.edits, self.how = "", read, edits, how
 

@@ -38,9 +38,7 @@ def rules_of(task: Task | str, changes: Changes, *, sutton_barto_reward: bool) -
 
 
 def added_of(
-    more: dict[str, Any],
-    disturbances: Disturbances | Mapping[str, Any] | None,
-    edits: Edits,
+    more: dict[str, Any], disturbances: Disturbances | Mapping[str, Any] | None, edits: Edits
 ) -> Disturbances:
     """Return an environment's disturbances; those among keyword arguments are taken out of there.
 

@@ -24,10 +24,7 @@ def check_engine(engine: str) -> None:
 
 
 def choose_engine(
-    engine: str,
-    backend: Backend,
-    cartpole: "CartPole | None" = None,
-    task: Task = CARTPOLE_V1,
+    engine: str, backend: Backend, cartpole: "CartPole | None" = None, task: Task = CARTPOLE_V1
 ) -> Engine:
     """Return the engine that was asked for, or the reference loop where that one cannot run.
 

@@ -26,9 +26,7 @@ State = npt.NDArray[np.float64]
 
 
 def learn_episodes(
-    env: gymnasium.Env[Any, Any],
-    learner: "Learner",
-    numbers: range,
+    env: gymnasium.Env[Any, Any], learner: "Learner", numbers: range
 ) -> Iterator[Episode]:
     """Let a learner play and learn, one episode per item.
 

@@ -80,11 +80,7 @@ def stored_model(
     """
     # Never by `load_model`, which would take some texts for a model's name or a path.
     cartpole = load_stored(
-        document,
-        f"'{folder / MODEL}'",
-        folder,
-        allow_assets,
-        own_timestep=config.own_timestep,
+        document, f"'{folder / MODEL}'", folder, allow_assets, own_timestep=config.own_timestep
     )
     return dataclasses.replace(cartpole, name=config.model)
 

@@ -170,11 +170,7 @@ def slices(
         [_field(kind, *place, grid, table, axes, visits) for place in places] for kind in shown
     ]
     return Grid(
-        title,
-        (names[axes.dims[0]], names[axes.dims[1]]),
-        fields,
-        limits=limits,
-        notes=notes,
+        title, (names[axes.dims[0]], names[axes.dims[1]]), fields, limits=limits, notes=notes
     )
 
 

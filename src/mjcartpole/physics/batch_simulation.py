@@ -42,11 +42,7 @@ class BatchSimulation:
     """
 
     def __init__(
-        self,
-        cartpole: CartPole,
-        n: int,
-        integrator: Integrator = "gym",
-        threads: int | None = None,
+        self, cartpole: CartPole, n: int, integrator: Integrator = "gym", threads: int | None = None
     ) -> None:
         """Prepare n simulations, stepped by so many threads; None: by as many as pay.
 

@@ -135,10 +135,7 @@ def overridden_masses(cartpole: CartPole) -> list[str]:
 
 
 def differs_from(
-    cartpole: CartPole,
-    reference: Parameters = equations.CARTPOLE_V1,
-    *,
-    task: Task = CARTPOLE_V1,
+    cartpole: CartPole, reference: Parameters = equations.CARTPOLE_V1, *, task: Task = CARTPOLE_V1
 ) -> list[str]:
     """Name all by which a model moves differently from a reference, one phrase each."""
     beyond = beyond_equations(cartpole, task=task)

@@ -120,11 +120,7 @@ def where_trained(
 
 
 def _placed(
-    name: str,
-    policy: Player,
-    config: TrainConfig,
-    run: runs.Run | None,
-    target: EvalTarget,
+    name: str, policy: Player, config: TrainConfig, run: runs.Run | None, target: EvalTarget
 ) -> PolicySetup:
     seed = evaluation.SEED if target.seed is None else target.seed
     evaluation.check_count(1, seed)

@@ -117,11 +117,7 @@ def table(
 
 
 def phase(
-    setup: PolicySetup,
-    *,
-    dims: Sequence[str] = (),
-    at: At | None = None,
-    episodes: int = PHASES,
+    setup: PolicySetup, *, dims: Sequence[str] = (), at: At | None = None, episodes: int = PHASES
 ) -> Grid:
     """Return greedy episodes in a plane, over the action that the table has there.
 

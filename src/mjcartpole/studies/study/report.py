@@ -308,11 +308,7 @@ def _unsolved(of: OfMeasure) -> str:
     )
 
 
-def _sentence(
-    of: OfMeasure,
-    points: Sequence[Labels],
-    shares: dict[tuple[str, ...], float],
-) -> str:
+def _sentence(of: OfMeasure, points: Sequence[Labels], shares: dict[tuple[str, ...], float]) -> str:
     best = points[0]
     middle, interval = _average(of.scores[best])
     trust = f"95 % {interval}, {len(best)} runs" if interval else "1 run"
