@@ -305,16 +305,11 @@ def load(
     check_known("task", task_name, known)
     added = added_of(more, disturbances, edits)
     task = known[task_name].with_changes(**cast(Changes, more))
-    if time_limit is None:
-        time_limit = task.time_limit * CONTROL_STEP
-    if not time_limit > 0:
-        raise ConfigError(f"time_limit must be more than 0 seconds, not {time_limit}")
     if seed is not None and seed < 0:
         raise ConfigError(f"seed must be a whole number from 0 up, not {seed}")
     cartpole = load_model(model, edits, own_timestep=own_timestep)
-    limit = time_limit
-    if not math.isinf(time_limit):
-        limit = max(1, round(time_limit / cartpole.control_step))
+    seconds = task.time_limit * CONTROL_STEP if time_limit is None else time_limit
+    limit = _steps_in(seconds, cartpole.control_step)
     kind = functools.partial(DisturbedBalance, disturbances=added) if added.are_some else Balance
     balance = kind(
         cartpole, random=seed, limit=limit, discrete=discrete, rules=task, observation=observation
@@ -324,3 +319,10 @@ def load(
     settings = {"legacy_step": False, **(environment_kwargs or {})}
     physics = Physics.of(cartpole)
     return control.Environment(physics, balance, n_sub_steps=cartpole.substeps, **settings)
+
+
+def _steps_in(seconds: float, control_step: float) -> float:
+    """Return how many control steps an episode of so many seconds has, one at least."""
+    if not seconds > 0:
+        raise ConfigError(f"time_limit must be more than 0 seconds, not {seconds}")
+    return seconds if math.isinf(seconds) else max(1, round(seconds / control_step))

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from mjcartpole.media.palette import PAPER
-from mjcartpole.media.plots import css, level, plot_style, short
+from mjcartpole.media.plots import css, legend_below, level, plot_style, short
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -106,10 +106,7 @@ class Curves:
         axes.xaxis.set_major_formatter("{x:,.0f}")
         if self.solved_at is not None:
             level(axes, self.solved_at)
-        legend = figure.legend(drawn, [line.name for line in self.lines], loc="outside lower left")
-        for text, line in zip(legend.get_texts(), self.lines, strict=True):
-            # Set here: a label that begins with an underscore would be left out.
-            text.set_text(short(line.name, 60) + _in_words(line))
+        legend_below(figure, drawn, [short(x.name, 60) + _in_words(x) for x in self.lines])
         return figure
 
     def _title(self) -> str:
@@ -129,13 +126,9 @@ class Curves:
         dashes = "o" if len(line.episodes) == 1 else dashes
         (drawn,) = axes.plot(line.episodes, line.middle, dashes, color=f"C{number}", zorder=3)
         if line.greedy is not None:
-            style: Any = {
-                "markerfacecolor": css(PAPER),
-                "markersize": 5,
-                "zorder": 4,
-                "clip_on": False,
-            }
-            axes.plot(*line.greedy, _MARKS[number % len(_MARKS)], color=f"C{number}", **style)
+            style: Any = {"markerfacecolor": css(PAPER), "color": f"C{number}", "clip_on": False}
+            mark = _MARKS[number % len(_MARKS)]
+            axes.plot(*line.greedy, mark, markersize=5, zorder=4, **style)
         return drawn
 
     def _draw_raw(self, axes: "Axes", raw: Any, colour: str) -> None:  # noqa: ANN401

@@ -3,7 +3,7 @@
 import contextlib
 import io
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Protocol
 
@@ -101,6 +101,14 @@ def level(axes: "Axes", y: float) -> None:
     axes.axhline(y, color=css(FAINT), linewidth=1)
     text = axes.annotate(f"{y:g}", (1, y), (0, -3), axes.get_yaxis_transform(), "offset points")
     text.set(color=css(FAINT), ha="right", va="top")
+
+
+def legend_below(figure: "Figure", lines: Sequence[Any], words: Sequence[str]) -> None:
+    """Say below a plot what its lines are."""
+    legend = figure.legend(lines, [str(n) for n in range(len(words))], loc="outside lower left")
+    for text, said in zip(legend.get_texts(), words, strict=True):
+        # Set here: a label that begins with an underscore would be left out.
+        text.set_text(said)
 
 
 def ink_on(colour: Any) -> str:  # noqa: ANN401

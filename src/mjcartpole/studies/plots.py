@@ -6,7 +6,7 @@ import numpy as np
 
 from mjcartpole.learning.naming import added_flags
 from mjcartpole.media.palette import MISSING, PAPER
-from mjcartpole.media.plots import css, ink_on, level, plain, plot_style, short
+from mjcartpole.media.plots import css, ink_on, legend_below, level, plain, plot_style, short
 from mjcartpole.studies.sweep import SweepResult
 from mjcartpole.studies.transfer import Cell, TransferResult
 
@@ -77,10 +77,8 @@ def curves(result: SweepResult) -> "Figure":
     axes.margins(x=0)
     if result.threshold is not None:
         level(axes, result.threshold)
-    legend = figure.legend(axes.lines[: len(policies)], policies, loc="outside lower left")
-    for text, name in zip(legend.get_texts(), policies, strict=True):
-        # Set here: a label that begins with an underscore would be left out.
-        text.set_text(short(name) + _in_words(result, name))
+    words = [short(name) + _in_words(result, name) for name in policies]
+    legend_below(figure, axes.lines[: len(policies)], words)
     return figure
 
 

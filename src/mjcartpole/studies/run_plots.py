@@ -4,6 +4,7 @@ Each function returns numbers that can be drawn (`media.plots.Plot`): `figure()`
 matplotlib, `rows()` has exactly what is drawn.
 """
 
+import dataclasses
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal
@@ -16,7 +17,7 @@ from mjcartpole.files import is_folder
 from mjcartpole.learning.episodes import ENDINGS, SIDES
 from mjcartpole.learning.evaluation import EPISODES
 from mjcartpole.learning.records import Record, read_visits
-from mjcartpole.learning.slices import SHOWN, check_of_state, choose_axes, names_of, slices
+from mjcartpole.learning.slices import SHOWN, check_of_state, choose_axes, slices
 from mjcartpole.media.curve_plot import Curves
 from mjcartpole.media.endings_plot import Endings, EndingsPlot, stretches
 from mjcartpole.media.grid_plot import Grid, Kind
@@ -137,20 +138,13 @@ def phase(
         for take in takes
     ]
     a, b = (limit_along(dimension, setup.task) for dimension in axes.dims)
-    names = names_of(policy.discretizer)
     drawn = slices(setup.name, policy.discretizer, policy.q_table, axes, shown=("action",))
-    return Grid(
-        drawn.title,
-        (names[axes.dims[0]], names[axes.dims[1]]),
-        drawn.fields,
-        paths,
-        (a, b),
-        notes=[
-            *(f"the table {words}" for words in drawn.notes),
-            f"{len(paths)} episodes: from a dot to a square (time limit) or a cross",
-            *setup.notes,
-        ],
-    )
+    notes = [
+        *(f"the table {words}" for words in drawn.notes),
+        f"{len(paths)} episodes: from a dot to a square (time limit) or a cross",
+        *setup.notes,
+    ]
+    return dataclasses.replace(drawn, paths=paths, limits=(a, b), notes=notes)
 
 
 def endings(folders: Iterable[Path], *, episodes: int = EPISODES) -> EndingsPlot:

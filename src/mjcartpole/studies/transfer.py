@@ -238,19 +238,21 @@ def transfer(
     rules, count = resolve(task), worker_count(workers, len(pairs))
     for place in found:
         place.check_disturbances(rules)
+    jobs = [(name, groups[name], place, rules, episodes, seed) for name, place in pairs]
+    names = tuple(place.name for place in found)
+    return TransferResult(tuple(policies), names, _at_once(jobs, count), seed, rules, disturbances)
+
+
+def _at_once(jobs: Sequence[Any], count: int) -> tuple[Cell, ...]:
+    """Return what `_play` makes of its arguments, so many at once."""
     # Threads: the compiled engine leaves Python's lock alone.
     with concurrent.futures.ThreadPoolExecutor(count) as pool:
-        futures = [
-            pool.submit(_play, name, groups[name], place, rules, episodes, seed)
-            for name, place in pairs
-        ]
+        futures = [pool.submit(_play, *job) for job in jobs]
         try:
-            cells = tuple(future.result() for future in futures)
+            return tuple(future.result() for future in futures)
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             raise
-    names = tuple(place.name for place in found)
-    return TransferResult(tuple(policies), names, cells, seed, rules, disturbances)
 
 
 def _play(

@@ -81,15 +81,8 @@ class ReportPlot:
         """Yield exactly what is drawn, as the lines of a table."""
         for levels in self.results.levels:
             for name, middle, low, high in self.averages(levels):
-                about = {"factor": levels.name, "level": name}
-                yield {
-                    **about,
-                    "what": "iqm",
-                    "at": None,
-                    "value": middle,
-                    "low": low,
-                    "high": high,
-                }
+                about = {"factor": levels.name, "level": name, "what": "iqm"}
+                yield {**about, "at": None, "value": middle, "low": low, "high": high}
             for place, name in enumerate(levels.names[:MOST_LEVELS]):
                 found = self.profile(levels, place)
                 columns = (found.thresholds, found.shares, found.low, found.high)
