@@ -29,7 +29,7 @@ from mjcartpole.learning.methods import (
     reinforce,
     sarsa,
 )
-from mjcartpole.learning.methods.experience import Dynamics, Trajectory, Transition
+from mjcartpole.learning.methods.experience import Dynamics, Rng, Trajectory, Transition
 from mjcartpole.learning.methods.parameters import Parameters
 
 
@@ -45,7 +45,7 @@ class Method(Protocol):
     Numbers: Any
     """The same for the functions: `numbers_class(Parameters, __name__)`."""
 
-    def make_memory(self, p: Any, n_rows: int, rng: np.random.Generator) -> Any:
+    def make_memory(self, p: Any, n_rows: int, rng: Rng) -> Any:
         """Return a NamedTuple of flat arrays: all that learning changes."""
 
     plan: Callable[[Any, Any, Discretizer, Dynamics], None]
@@ -56,7 +56,7 @@ class Method(Protocol):
     """What a method has whose memory could contradict itself: raises ValueError, and names the
     field. What each field may hold stands in its type (see `limits`). Others need not have it."""
 
-    imagine: Callable[[Any, Any, gymnasium.Env[Any, Any], float, np.random.Generator], Fitted]
+    imagine: Callable[[Any, Any, gymnasium.Env[Any, Any], float, Rng], Fitted]
     """What a method has whose episodes are played in a model of the world: from p, memory, the
     world, the seconds of its control step and the learner's generator to that model, which memory
     keeps. Others need not have it."""
@@ -64,17 +64,13 @@ class Method(Protocol):
     def begin_episode(self, p: Any, memory: Any, number: int, episodes: int) -> Any:
         """Return a NamedTuple of what holds during one of so many episodes, counted from 0."""
 
-    def act(self, p: Any, memory: Any, rates: Any, s: int, rng: np.random.Generator) -> int:
+    def act(self, p: Any, memory: Any, rates: Any, s: int, rng: Rng) -> int:
         """Return the action in a state, a row of the table."""
 
-    def after_step(
-        self, p: Any, memory: Any, rates: Any, step: Transition, rng: np.random.Generator
-    ) -> None:
+    def after_step(self, p: Any, memory: Any, rates: Any, step: Transition, rng: Rng) -> None:
         """Learn from one step."""
 
-    def after_episode(
-        self, p: Any, memory: Any, rates: Any, episode: Trajectory, rng: np.random.Generator
-    ) -> None:
+    def after_episode(self, p: Any, memory: Any, rates: Any, episode: Trajectory, rng: Rng) -> None:
         """Learn from a whole episode."""
 
     def greedy_values(self, memory: Any) -> npt.NDArray[np.float64]:

@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from mjcartpole.errors import ConfigError
 from mjcartpole.learning.discretizer import is_finite
-from mjcartpole.learning.methods.experience import Trajectory
+from mjcartpole.learning.methods.experience import Rng, Trajectory
 from mjcartpole.learning.methods.parameters import Parameters
 from mjcartpole.learning.schedules import linear
 from mjcartpole.learning.tiles import Table, add_at, all_weights, pair_at, value_at
@@ -109,14 +109,14 @@ class QTable(NamedTuple):
     q_table: Table
 
 
-def draw_table(p: Any, n_rows: int, rng: np.random.Generator) -> npt.NDArray[np.float64]:
+def draw_table(p: Any, n_rows: int, rng: Rng) -> npt.NDArray[np.float64]:
     """Return a first table, flat, drawn uniformly from `q_init_low` to `q_init_high`."""
     # Without the sum, numpy calls 0.0 to -0.0 a range that runs backwards.
     table = rng.uniform(p.q_init_low, p.q_init_high + 0.0, size=n_rows * N_ACTIONS)
     return table / all_weights(p.tiles)
 
 
-def make_memory(p: Any, n_rows: int, rng: np.random.Generator) -> QTable:
+def make_memory(p: Any, n_rows: int, rng: Rng) -> QTable:
     """Return a table to begin with."""
     return QTable(draw_table(p, n_rows, rng))
 
@@ -138,7 +138,7 @@ def greedy_values(memory: Any) -> npt.NDArray[np.float64]:
     return np.asarray(memory.q_table).reshape(-1, N_ACTIONS)
 
 
-def choose(p: Any, q: Table, s: int, epsilon: float, rng: np.random.Generator) -> int:
+def choose(p: Any, q: Table, s: int, epsilon: float, rng: Rng) -> int:
     """Return an action: random with probability epsilon, else the better one.
 
     `p.ties` 0 takes the first of two equal actions, 1 draws one; `rng` gives one number, and one
@@ -149,7 +149,7 @@ def choose(p: Any, q: Table, s: int, epsilon: float, rng: np.random.Generator) -
     return prefer(p, pair_at(p.tiles, q, s), rng)
 
 
-def prefer(p: Any, pair: tuple[float, float], rng: np.random.Generator) -> int:
+def prefer(p: Any, pair: tuple[float, float], rng: Rng) -> int:
     """Return the better action by the values of both; of equals the first, or one that is drawn."""
     left, right = pair
     if left == right and p.ties == 1:
@@ -157,7 +157,7 @@ def prefer(p: Any, pair: tuple[float, float], rng: np.random.Generator) -> int:
     return 1 if right > left else 0
 
 
-def act(p: Any, memory: Any, rates: Rates, s: int, rng: np.random.Generator) -> int:
+def act(p: Any, memory: Any, rates: Rates, s: int, rng: Rng) -> int:
     """Return the epsilon-greedy action in a state."""
     return choose(p, memory.q_table, s, rates.epsilon, rng)
 
@@ -184,7 +184,5 @@ def move_towards(p: Any, q: Table, s: int, a: int, target: float, alpha: float) 
     add_at(p.tiles, q, s, a, alpha * (target - value(p, q, s, a)))
 
 
-def learn_no_more(
-    p: Any, memory: Any, rates: Any, episode: Trajectory, rng: np.random.Generator
-) -> None:
+def learn_no_more(p: Any, memory: Any, rates: Any, episode: Trajectory, rng: Rng) -> None:
     """Leave an episode as it was learned step by step: `after_episode` of methods that do so."""

@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mjcartpole.learning.methods.action_values import FloatMemory, learn_no_more
-from mjcartpole.learning.methods.experience import Transition
+from mjcartpole.learning.methods.experience import Rng, Transition
 from mjcartpole.learning.methods.limits import NoSteps, NoTraces, States
 from mjcartpole.learning.methods.parameters import numbers_class
 from mjcartpole.learning.methods.preferences import (
@@ -74,16 +74,14 @@ class Memory(NamedTuple):
     """How many these are; shape (1,)."""
 
 
-def make_memory(p: Any, n_rows: int, rng: np.random.Generator) -> Memory:
+def make_memory(p: Any, n_rows: int, rng: Rng) -> Memory:
     """Return preferences and values to begin with, and no traces."""
     none, states = np.zeros(n_rows), np.zeros(n_rows, np.int64)
     h, v = first_preferences(n_rows), first_values(p, n_rows)
     return Memory(h, v, none, none.copy(), states, np.zeros(1, np.int64))
 
 
-def after_step(
-    p: Any, memory: Memory, rates: Rates, step: Transition, rng: np.random.Generator
-) -> None:
+def after_step(p: Any, memory: Memory, rates: Rates, step: Transition, rng: Rng) -> None:
     """Learn from one step."""
     h, v, s = memory.preferences, memory.state_values, step.s
     error = step.r - v[s]

@@ -27,7 +27,7 @@ from mjcartpole.learning.methods.action_values import (
     prefer,
     value,
 )
-from mjcartpole.learning.methods.experience import Transition
+from mjcartpole.learning.methods.experience import Rng, Transition
 from mjcartpole.learning.methods.parameters import numbers_class
 from mjcartpole.learning.tiles import Table, pair_at
 from mjcartpole.task import N_ACTIONS
@@ -56,12 +56,12 @@ class Memory(NamedTuple):
     second: Table
 
 
-def make_memory(p: Any, n_rows: int, rng: np.random.Generator) -> Memory:
+def make_memory(p: Any, n_rows: int, rng: Rng) -> Memory:
     """Return two tables to begin with."""
     return Memory(draw_table(p, n_rows, rng), draw_table(p, n_rows, rng))
 
 
-def act(p: Any, memory: Memory, rates: Rates, s: int, rng: np.random.Generator) -> int:
+def act(p: Any, memory: Memory, rates: Rates, s: int, rng: Rng) -> int:
     """Return the epsilon-greedy action by both tables."""
     if rng.random() < rates.epsilon:
         return int(rng.random() * N_ACTIONS)
@@ -69,9 +69,7 @@ def act(p: Any, memory: Memory, rates: Rates, s: int, rng: np.random.Generator) 
     return prefer(p, (first[0] + second[0], first[1] + second[1]), rng)
 
 
-def after_step(
-    p: Any, memory: Memory, rates: Rates, step: Transition, rng: np.random.Generator
-) -> None:
+def after_step(p: Any, memory: Memory, rates: Rates, step: Transition, rng: Rng) -> None:
     """Let one table learn from one step."""
     if step.over and not p.learn_last_step:
         return

@@ -12,8 +12,6 @@ truncated episode would have gone on, so it bootstraps.
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from mjcartpole.learning.methods.action_values import (
     QTable,
     Rates,
@@ -25,7 +23,7 @@ from mjcartpole.learning.methods.action_values import (
     make_memory,
     move_towards,
 )
-from mjcartpole.learning.methods.experience import Transition
+from mjcartpole.learning.methods.experience import Rng, Transition
 from mjcartpole.learning.methods.parameters import numbers_class
 from mjcartpole.learning.tiles import pair_at
 
@@ -41,9 +39,7 @@ Numbers = numbers_class(Parameters, __name__)
 after_episode = learn_no_more
 
 
-def after_step(
-    p: Any, memory: QTable, rates: Rates, step: Transition, rng: np.random.Generator
-) -> None:
+def after_step(p: Any, memory: QTable, rates: Rates, step: Transition, rng: Rng) -> None:
     """Learn from one step."""
     if step.over and not p.learn_last_step:
         return

@@ -8,6 +8,8 @@ import numpy.typing as npt
 
 from mjcartpole.learning.discretizer import Floats, Ints
 
+Rng: TypeAlias = np.random.Generator
+
 
 class Transition(NamedTuple):
     """One step."""

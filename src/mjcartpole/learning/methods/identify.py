@@ -17,6 +17,7 @@ from mjcartpole.learning.dream import look
 from mjcartpole.learning.fitted import Fitted, Linear, Rod, fit_linear, fit_rod
 from mjcartpole.learning.methods import q_learning
 from mjcartpole.learning.methods.action_values import FloatMemory, draw_table, greedy_values
+from mjcartpole.learning.methods.experience import Rng
 from mjcartpole.learning.methods.limits import StepCounts
 from mjcartpole.learning.methods.parameters import numbers_class
 from mjcartpole.learning.methods.q_learning import act, after_episode, after_step, begin_episode
@@ -84,15 +85,13 @@ class Memory(NamedTuple):
     """How many episodes and steps of the world it was fitted to; 0 as long as it was not."""
 
 
-def make_memory(p: Any, n_rows: int, rng: np.random.Generator) -> Memory:
+def make_memory(p: Any, n_rows: int, rng: Rng) -> Memory:
     """Return a table to begin with, and no model."""
     size = 6 if p.fit == 0 else 16
     return Memory(draw_table(p, n_rows, rng), np.zeros(size), np.zeros(2, np.int64))
 
 
-def imagine(
-    p: Any, memory: Memory, env: gymnasium.Env[Any, Any], h: float, rng: np.random.Generator
-) -> Fitted:
+def imagine(p: Any, memory: Memory, env: gymnasium.Env[Any, Any], h: float, rng: Rng) -> Fitted:
     """Return the model that episodes are played in; fit it, where that was not done yet."""
     model, is_rod = np.asarray(memory.model), p.fit == 0
     if not memory.seen[0]:

@@ -16,8 +16,6 @@ With `plan_after="failure"` a table that has just balanced stays as it is, while
 from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
 
-import numpy as np
-
 from mjcartpole.learning.methods.action_values import (
     ExplorationParameters,
     FloatMemory,
@@ -27,7 +25,7 @@ from mjcartpole.learning.methods.action_values import (
     explore,
     greedy_values,
 )
-from mjcartpole.learning.methods.experience import Trajectory, Transition
+from mjcartpole.learning.methods.experience import Rng, Trajectory, Transition
 from mjcartpole.learning.methods.limits import PairCounts, Pairs, StepCounts
 from mjcartpole.learning.methods.parameters import numbers_class
 from mjcartpole.learning.methods.transition_counts import (
@@ -82,22 +80,18 @@ class Memory(NamedTuple):
     n_seen: PairCounts
 
 
-def make_memory(p: Any, n_rows: int, rng: np.random.Generator) -> Memory:
+def make_memory(p: Any, n_rows: int, rng: Rng) -> Memory:
     """Return a table to begin with, and counts of nothing."""
     return Memory(draw_table(p, n_rows, rng), *make_counts(p, n_rows))
 
 
-def after_step(
-    p: Any, memory: Memory, rates: Rates, step: Transition, rng: np.random.Generator
-) -> None:
+def after_step(p: Any, memory: Memory, rates: Rates, step: Transition, rng: Rng) -> None:
     """Count one step."""
     if p.learn_last_step or not step.over:
         count(p, memory, step)
 
 
-def after_episode(
-    p: Any, memory: Memory, rates: Rates, episode: Trajectory, rng: np.random.Generator
-) -> None:
+def after_episode(p: Any, memory: Memory, rates: Rates, episode: Trajectory, rng: Rng) -> None:
     """Sweep until the values are those of the model."""
     if p.plan_after == 1 and not episode.terminated:
         return

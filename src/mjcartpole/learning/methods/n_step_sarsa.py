@@ -27,7 +27,7 @@ from mjcartpole.learning.methods.action_values import (
     move_towards,
     value,
 )
-from mjcartpole.learning.methods.experience import Transition
+from mjcartpole.learning.methods.experience import Rng, Transition
 from mjcartpole.learning.methods.limits import Actions, NoAction, NoSteps, States
 from mjcartpole.learning.methods.parameters import numbers_class
 from mjcartpole.learning.methods.sarsa import act
@@ -70,16 +70,14 @@ class Memory(NamedTuple):
     rewards: FloatMemory
 
 
-def make_memory(p: Any, n_rows: int, rng: np.random.Generator) -> Memory:
+def make_memory(p: Any, n_rows: int, rng: Rng) -> Memory:
     """Return a table to begin with, and no steps."""
     none, n = np.zeros(1, np.int64), p.n_steps
     ring = np.zeros(n, np.int64)
     return Memory(draw_table(p, n_rows, rng), none - 1, none, ring, ring.copy(), np.zeros(n))
 
 
-def after_step(
-    p: Any, memory: Memory, rates: Rates, step: Transition, rng: np.random.Generator
-) -> None:
+def after_step(p: Any, memory: Memory, rates: Rates, step: Transition, rng: Rng) -> None:
     """Draw the next action, and learn from the step that is n - 1 steps old, or at the end all."""
     q, n, t = memory.q_table, p.n_steps, memory.steps_done[0]
     slot = t % n

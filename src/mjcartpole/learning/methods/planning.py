@@ -26,7 +26,7 @@ from mjcartpole.learning.methods.action_values import (
     greedy_values,
     learn_no_more,
 )
-from mjcartpole.learning.methods.experience import Dynamics, Transition, Vector
+from mjcartpole.learning.methods.experience import Dynamics, Rng, Transition, Vector
 from mjcartpole.learning.methods.parameters import numbers_class
 from mjcartpole.packages import check_installed
 from mjcartpole.task import N_ACTIONS
@@ -61,7 +61,7 @@ Numbers = numbers_class(Parameters, __name__)
 after_episode = learn_no_more
 
 
-def make_memory(p: Any, n_rows: int, rng: np.random.Generator) -> QTable:
+def make_memory(p: Any, n_rows: int, rng: Rng) -> QTable:
     """Return an empty table."""
     return QTable(np.zeros(n_rows * N_ACTIONS))
 
@@ -122,14 +122,12 @@ def begin_episode(p: Any, memory: QTable, number: int, episodes: int) -> Rates:
     return Rates(0.0, 0.0)
 
 
-def act(p: Any, memory: QTable, rates: Rates, s: int, rng: np.random.Generator) -> int:
+def act(p: Any, memory: QTable, rates: Rates, s: int, rng: Rng) -> int:
     """Return the better action in a state, the first of equals."""
     return better(p, memory.q_table, s)
 
 
-def after_step(
-    p: Any, memory: QTable, rates: Rates, step: Transition, rng: np.random.Generator
-) -> None:
+def after_step(p: Any, memory: QTable, rates: Rates, step: Transition, rng: Rng) -> None:
     """Learn nothing."""
 
 

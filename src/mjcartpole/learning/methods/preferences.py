@@ -18,6 +18,7 @@ import numpy.typing as npt
 from mjcartpole.errors import ConfigError
 from mjcartpole.learning.discretizer import is_finite
 from mjcartpole.learning.methods.action_values import StepSizeParameters
+from mjcartpole.learning.methods.experience import Rng
 from mjcartpole.learning.schedules import linear
 from mjcartpole.learning.tiles import Table
 from mjcartpole.task import N_ACTIONS
@@ -83,7 +84,7 @@ def probability_of_right(h: Table, s: int) -> float:
     return odds / (1 + odds)
 
 
-def act(p: Any, memory: Any, rates: Rates, s: int, rng: np.random.Generator) -> int:
+def act(p: Any, memory: Any, rates: Rates, s: int, rng: Rng) -> int:
     """Return an action that is drawn by the preferences."""
     return 1 if rng.random() < probability_of_right(memory.preferences, s) else 0
 

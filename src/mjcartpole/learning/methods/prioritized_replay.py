@@ -30,7 +30,7 @@ from mjcartpole.learning.methods.action_values import (
     value,
 )
 from mjcartpole.learning.methods.action_values import begin_episode as begin_rates
-from mjcartpole.learning.methods.experience import Transition
+from mjcartpole.learning.methods.experience import Rng, Transition
 from mjcartpole.learning.methods.limits import Actions, Flags, States, StepCounts
 from mjcartpole.learning.methods.parameters import numbers_class
 from mjcartpole.learning.methods.sum_tree import (
@@ -103,7 +103,7 @@ class Memory(NamedTuple):
     """How many there were; shape (1,)."""
 
 
-def make_memory(p: Any, n_rows: int, rng: np.random.Generator) -> Memory:
+def make_memory(p: Any, n_rows: int, rng: Rng) -> Memory:
     """Return a table to begin with, and no steps."""
     size, whole = p.replay_size, np.int64
     return Memory(
@@ -131,9 +131,7 @@ def begin_episode(p: Any, memory: Any, number: int, episodes: int) -> ReplayRate
     return ReplayRates(rates.alpha, rates.epsilon, linear(p.beta, 1.0, episodes, number))
 
 
-def after_step(
-    p: Any, memory: Memory, rates: ReplayRates, step: Transition, rng: np.random.Generator
-) -> None:
+def after_step(p: Any, memory: Memory, rates: ReplayRates, step: Transition, rng: Rng) -> None:
     """Remember one step, and learn from some that are remembered."""
     if step.over and not p.learn_last_step:
         return

@@ -27,7 +27,7 @@ from mjcartpole.learning.methods.action_values import (
     greedy_values,
     learn_no_more,
 )
-from mjcartpole.learning.methods.experience import Transition
+from mjcartpole.learning.methods.experience import Rng, Transition
 from mjcartpole.learning.methods.limits import PairCounts, Pairs, StepCounts, refuse
 from mjcartpole.learning.methods.parameters import numbers_class
 from mjcartpole.learning.methods.priority_queue import check_queue, make_queue, pop, push
@@ -96,7 +96,7 @@ class Memory(NamedTuple):
     """… and how many are in each; a full one takes no more."""
 
 
-def make_memory(p: Any, n_rows: int, rng: np.random.Generator) -> Memory:
+def make_memory(p: Any, n_rows: int, rng: Rng) -> Memory:
     """Return a table to begin with, counts of nothing and an empty queue."""
     check_places(n_rows, "predecessors", p.predecessors, n_rows * p.predecessors)
     return Memory(
@@ -119,9 +119,7 @@ def check_memory(p: Any, memory: Any) -> None:
         refuse(name, "has what visits has not", memory.visits[pairs] == 0)
 
 
-def after_step(
-    p: Any, memory: Memory, rates: Rates, step: Transition, rng: np.random.Generator
-) -> None:
+def after_step(p: Any, memory: Memory, rates: Rates, step: Transition, rng: Rng) -> None:
     """Count one step, and compute some values anew."""
     if step.over and not p.learn_last_step:
         return

@@ -16,8 +16,6 @@ gone on, so it bootstraps like any other step.
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from mjcartpole.learning.methods.action_values import (
     QTable,
     Rates,
@@ -29,7 +27,7 @@ from mjcartpole.learning.methods.action_values import (
     make_memory,
     move_towards,
 )
-from mjcartpole.learning.methods.experience import Trajectory, Transition
+from mjcartpole.learning.methods.experience import Rng, Trajectory, Transition
 from mjcartpole.learning.methods.parameters import numbers_class
 
 __all__ = ["act", "begin_episode", "greedy_values", "make_memory"]
@@ -52,9 +50,7 @@ class Parameters(TiledParameters):
 Numbers = numbers_class(Parameters, __name__)
 
 
-def after_step(
-    p: Any, memory: QTable, rates: Rates, step: Transition, rng: np.random.Generator
-) -> None:
+def after_step(p: Any, memory: QTable, rates: Rates, step: Transition, rng: Rng) -> None:
     """Learn from one step, unless the episode is learned when it is over."""
     if p.td_lambda >= 0 or (step.over and not p.learn_last_step):
         return
@@ -64,9 +60,7 @@ def after_step(
     move_towards(p, memory.q_table, step.s, step.a, target, rates.alpha)
 
 
-def after_episode(
-    p: Any, memory: QTable, rates: Rates, episode: Trajectory, rng: np.random.Generator
-) -> None:
+def after_episode(p: Any, memory: QTable, rates: Rates, episode: Trajectory, rng: Rng) -> None:
     """Learn from an episode by lambda-returns, last step first."""
     if p.td_lambda < 0:
         return

@@ -14,10 +14,8 @@ hardly count, is left out, as is usual. A truncated episode would have gone on: 
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from mjcartpole.learning.methods.action_values import FloatMemory
-from mjcartpole.learning.methods.experience import Trajectory, Transition
+from mjcartpole.learning.methods.experience import Rng, Trajectory, Transition
 from mjcartpole.learning.methods.parameters import numbers_class
 from mjcartpole.learning.methods.preferences import (
     PreferenceParameters,
@@ -63,20 +61,16 @@ class Memory(NamedTuple):
     state_values: FloatMemory
 
 
-def make_memory(p: Any, n_rows: int, rng: np.random.Generator) -> Memory:
+def make_memory(p: Any, n_rows: int, rng: Rng) -> Memory:
     """Return preferences and values to begin with."""
     return Memory(first_preferences(n_rows), first_values(p, n_rows))
 
 
-def after_step(
-    p: Any, memory: Memory, rates: Rates, step: Transition, rng: np.random.Generator
-) -> None:
+def after_step(p: Any, memory: Memory, rates: Rates, step: Transition, rng: Rng) -> None:
     """Wait until the episode is over."""
 
 
-def after_episode(
-    p: Any, memory: Memory, rates: Rates, episode: Trajectory, rng: np.random.Generator
-) -> None:
+def after_episode(p: Any, memory: Memory, rates: Rates, episode: Trajectory, rng: Rng) -> None:
     """Learn from an episode, last step first."""
     h, v = memory.preferences, memory.state_values
     total = 0.0 if episode.terminated else v[episode.states[episode.steps]]

@@ -24,7 +24,7 @@ from mjcartpole.learning.methods.action_values import (
     move_towards,
     value,
 )
-from mjcartpole.learning.methods.experience import Transition
+from mjcartpole.learning.methods.experience import Rng, Transition
 from mjcartpole.learning.methods.limits import NoAction
 from mjcartpole.learning.methods.parameters import numbers_class
 from mjcartpole.learning.tiles import Table
@@ -49,21 +49,19 @@ class Memory(NamedTuple):
     """Shape (1,); -1 at the start of an episode."""
 
 
-def make_memory(p: Any, n_rows: int, rng: np.random.Generator) -> Memory:
+def make_memory(p: Any, n_rows: int, rng: Rng) -> Memory:
     """Return a table to begin with, and no action."""
     return Memory(draw_table(p, n_rows, rng), np.array([-1], np.int64))
 
 
-def act(p: Any, memory: Memory, rates: Rates, s: int, rng: np.random.Generator) -> int:
+def act(p: Any, memory: Memory, rates: Rates, s: int, rng: Rng) -> int:
     """Return the action that was learned from, or at the start of an episode a new one."""
     if memory.next_action[0] >= 0:
         return memory.next_action[0]
     return choose(p, memory.q_table, s, rates.epsilon, rng)
 
 
-def after_step(
-    p: Any, memory: Memory, rates: Rates, step: Transition, rng: np.random.Generator
-) -> None:
+def after_step(p: Any, memory: Memory, rates: Rates, step: Transition, rng: Rng) -> None:
     """Draw the next action, and learn from the one before."""
     q, target = memory.q_table, step.r
     if not step.terminated:
