@@ -38,21 +38,26 @@ def number_of(name: str, value: SupportsFloat | str, unit: str, *, is_limit: boo
     Raises:
         ConfigError: It is none.
     """
-    try:
-        number = math.nan if isinstance(value, bool | str) else float(value)
-    except (TypeError, ValueError, OverflowError):
-        number = math.nan
+    number = as_float(value)
     if (is_limit and number == math.inf) or (
         -FARTHEST <= number <= FARTHEST and (number > 0 or not is_limit)
     ):
-        # Without the sum, numpy calls 0.0 to -0.0 a range that runs backwards.
-        return number + 0.0
+        return number
     bounds = (
         f"more than 0 and at most {FARTHEST:g}, or infinite"
         if is_limit
         else f"from {-FARTHEST:g} to {FARTHEST:g}"
     )
     raise ConfigError(f"{name} must be a number ({unit}) {bounds}, not {value!r}")
+
+
+def as_float(value: Any) -> float:  # noqa: ANN401 - to be checked
+    """Return a number, NaN where it is none."""
+    try:
+        # Without the sum, numpy calls 0.0 to -0.0 a range that runs backwards.
+        return math.nan if isinstance(value, bool | str) else float(value) + 0.0
+    except (TypeError, ValueError, OverflowError):
+        return math.nan
 
 
 _STATE: Final = "m, m/s, rad, rad/s"

@@ -18,7 +18,7 @@ from mjcartpole.disturbances.effects import QUEUE, Effects
 from mjcartpole.disturbances.ranges import NOTHING, Range, parse_ranges
 from mjcartpole.disturbances.shoves import LARGEST, Shove, parse_shove
 from mjcartpole.errors import ConfigError, check_known, nearest
-from mjcartpole.rules import MOST_STEPS, RULES
+from mjcartpole.rules import MOST_STEPS, RULES, as_float
 from mjcartpole.task import Task, state_names
 
 SMALLEST_STEP: Final = 1e-6
@@ -260,22 +260,14 @@ def _check_count(name: str, value: object, most: int) -> None:
 
 
 def _size(name: str, value: Any, unit: str, most: float) -> float:  # noqa: ANN401 - to be checked
-    number = _as_float(value)
+    number = as_float(value)
     if not 0 <= number <= most:
         raise ConfigError(f"{name} must be from 0 to {most:,g} ({unit}), not {value!r}")
     return number
 
 
-def _as_float(value: Any) -> float:  # noqa: ANN401 - to be checked
-    """Return a number, NaN where it is none."""
-    try:
-        return math.nan if isinstance(value, bool | str) else float(value) + 0.0
-    except (TypeError, ValueError, OverflowError):
-        return math.nan
-
-
 def _number(name: str, value: Any) -> float:  # noqa: ANN401 - to be checked
-    number = _as_float(value)
+    number = as_float(value)
     if not abs(number) <= LARGEST:
         raise ConfigError(f"{name} must be a number up to {LARGEST:,g}, not {value!r}")
     return number
