@@ -65,10 +65,10 @@ LACKS = {
     "write_pictures(Path(), iter([]), 1)": (
         "a folder of pictures needs the package imageio: pip install imageio"
     ),
-    "plots.check_installed()": (
+    "plots.plot_style().__enter__()": (
         "a plot needs the package matplotlib: pip install 'mjcartpole[plot]'"
     ),
-    "tensorboard.check_writer()": (
+    "tensorboard.write_events(None, None)": (
         "--tensorboard needs the package tensorboardX: pip install 'mjcartpole[tensorboard]'"
     ),
     "cluster.connected('').__enter__()": (
