@@ -17,7 +17,7 @@ from mjcartpole import __version__
 from mjcartpole.errors import MjCartPoleError
 from mjcartpole.output import ERASE, FAILED, has_left, patient_output, stdout_problem
 from mjcartpole.packages import check_installed
-from mjcartpole.signals import Interrupted, StopSignals
+from mjcartpole.signals import StopSignals
 
 INTERRUPTED = 130
 
@@ -77,8 +77,7 @@ def _run(argv: list[str], is_own: bool) -> int:
 def _import_mujoco(is_own: bool) -> None:
     """Import what each command needs; MuJoCo's modules lose an interrupt that comes meanwhile.
 
-    Args:
-        is_own: Whether MuJoCo has nobody else here to measure its steps for.
+    In a process of the command's own MuJoCo has nobody to measure its steps for.
 
     Raises:
         Interrupted: One came.
@@ -90,8 +89,7 @@ def _import_mujoco(is_own: bool) -> None:
 
         if is_own:
             stop_timers()
-    if signals.stop():
-        raise Interrupted(number=signals.number)
+    signals.raise_noted()
 
 
 @contextlib.contextmanager

@@ -38,6 +38,11 @@ class StopSignals:
         """Return whether a signal has come."""
         return self.number != 0
 
+    def raise_noted(self) -> None:
+        """Raise `Interrupted` if a signal has come."""
+        if self.stop():
+            raise Interrupted(number=self.number)
+
     @contextlib.contextmanager
     def caught(self) -> Iterator[None]:
         """Catch these signals inside; they raise `Interrupted`.

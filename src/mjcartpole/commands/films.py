@@ -17,7 +17,7 @@ from mjcartpole.media.mp4 import why_no_mp4
 from mjcartpole.media.pillow import Image
 from mjcartpole.media.video import Video, write_video
 from mjcartpole.physics.cartpole import CartPole
-from mjcartpole.signals import Interrupted, StopSignals
+from mjcartpole.signals import StopSignals
 from mjcartpole.studies.film import Film, Frame, Rollout, play
 from mjcartpole.studies.policy_setup import PolicySetup, where_trained
 from mjcartpole.studies.video_options import VideoOptions
@@ -92,14 +92,8 @@ def _with_progress(
     with Bar(lambda: "filming", drawn.length, "frames") as bar:
         for frame in bar.track(drawn.frames()):
             check()
-            raise_noted(signals)
+            signals.raise_noted()
             yield frame
-
-
-def raise_noted(signals: StopSignals) -> None:
-    """Raise `Interrupted` if a signal has come."""
-    if signals.stop():
-        raise Interrupted(number=signals.number)
 
 
 def what_happened(casts: Casts) -> str:
@@ -122,7 +116,7 @@ def write_sheet(casts: Casts, look: VideoOptions, path: Path, signals: StopSigna
     """
     with signals.deferred(), Film(casts, look) as drawn:
         picture = drawn.contact_sheet(SHEET_FRAMES)
-        raise_noted(signals)
+        signals.raise_noted()
         with atomic_write(path) as temporary:
             Image.fromarray(picture).save(temporary)
         height, width = picture.shape[:2]

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from mjcartpole.commands.films import raise_noted, what_happened, write_film
+from mjcartpole.commands.films import what_happened, write_film
 from mjcartpole.commands.options import VIDEOS
 from mjcartpole.commands.watched_file import POLL, SavedAgainError, Watched
 from mjcartpole.errors import MjCartPoleError
@@ -158,7 +158,7 @@ class WatchWork:
         # Shadows and smooth edges would cost more time than all the rest, a sky nearly as much.
         look = VideoOptions(quality="draft", fps=FPS)
         video, drawn_by = write_film(casts, look, path, self.signals, self.watched.check)
-        raise_noted(self.signals)
+        self.signals.raise_noted()
         _say("video", f"{video.path} ({what_happened(casts)}; drawn by {drawn_by})")
 
 

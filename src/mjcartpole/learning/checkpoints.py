@@ -211,8 +211,9 @@ def _snapshot(
     if snapshot.chance_rng is None and config.disturbances.are_some:
         raise ValueError("no generator for the disturbances of the config")
     _check_snapshot(snapshot, config.evaluation_period)
-    if visits is not None:
-        check_visits(visits, learner.visits.size, int(columns.steps.sum()))
+    steps, size = int(columns.steps.sum()), learner.visits.size
+    if visits is not None and (visits.size != size or visits.min() < 0 or visits.sum() != steps):
+        raise ValueError("visits that are not those of its episodes")
     return snapshot
 
 
@@ -237,12 +238,6 @@ def _added(
 ) -> npt.NDArray[Any] | None:
     """Return an array that some checkpoints lack."""
     return _array(archive, name, kind, most) if f"{name}.npy" in archive.namelist() else None
-
-
-def check_visits(visits: npt.NDArray[np.int64], size: int, steps: int) -> None:
-    """Refuse visits that a training of so many steps cannot have made (ValueError)."""
-    if visits.size != size or (visits < 0).any() or int(visits.sum()) != steps:
-        raise ValueError("visits that are not those of its episodes")
 
 
 def _array(archive: zipfile.ZipFile, name: str, kind: npt.DTypeLike, most: int) -> npt.NDArray[Any]:

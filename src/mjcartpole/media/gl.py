@@ -21,12 +21,12 @@ import sys
 import threading
 import weakref
 from types import ModuleType
-from typing import Final, Protocol, get_args
+from typing import Final, get_args
 
 from mjcartpole.errors import RenderError, check_known
 from mjcartpole.media import backend_probe
 from mjcartpole.media.backend_probe import PLATFORM_VARIABLE, try_backend
-from mjcartpole.media.turns import end_drawing
+from mjcartpole.media.turns import Renderer, end_drawing
 
 Backend = backend_probe.Backend
 
@@ -47,13 +47,6 @@ _log = logging.getLogger("mjcartpole")
 _lock = threading.RLock()
 _used = False
 _forked = False
-
-
-class Closeable(Protocol):
-    """Something that frees what it holds when told to."""
-
-    def close(self) -> None:
-        """Free it; a second call does nothing."""
 
 
 class Context:
@@ -225,10 +218,10 @@ def make_context(backend: Backend, width: int, height: int) -> Context:
 
 
 _contexts: "weakref.WeakSet[Context]" = weakref.WeakSet()
-_open: "weakref.WeakSet[Closeable]" = weakref.WeakSet()
+_open: "weakref.WeakSet[Renderer]" = weakref.WeakSet()
 
 
-def close_at_exit(renderer: Closeable) -> None:
+def close_at_exit(renderer: Renderer) -> None:
     """Have a renderer closed when the interpreter exits, if nobody has closed it before.
 
     Call it after the renderer's context is made: functions registered last run first, and MuJoCo

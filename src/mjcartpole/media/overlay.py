@@ -1,9 +1,4 @@
-"""What happens, written into the picture: a strip with numbers, and an arrow at the cart.
-
-The strip holds the step and the return so far, the state with its units, and the two action
-values of the table's current cell. It is kept from frame to frame; only numbers that change are
-written again, and the frame itself is changed in place.
-"""
+"""What happens, written into the picture: a strip with numbers, and an arrow at the cart."""
 
 import math
 from typing import Final
