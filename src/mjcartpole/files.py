@@ -94,11 +94,7 @@ def read_bytes(
     follow: bool = False,
     refusal: type[FileError] = FileError,
 ) -> bytes:
-    """Return the content of a file; see `opened`.
-
-    Raises:
-        FileError: See `opened`.
-    """
+    """Return the content of a file; see `opened`, also for what is raised."""
     with opened(path, most, follow=follow, refusal=refusal) as file:
         return file.read(most)
 

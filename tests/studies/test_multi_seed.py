@@ -16,7 +16,7 @@ from mjcartpole.learning.policy import Policy
 from mjcartpole.learning.training import train
 from mjcartpole.physics.load import load_model
 from mjcartpole.studies import multi_seed
-from mjcartpole.studies.multi_seed import SeedRunner, train_many
+from mjcartpole.studies.multi_seed import SeedJob, SeedRunner, train_many
 from nightly import few
 
 CONFIG = TrainConfig(episodes=15, backend="gym", seed=4)
@@ -106,9 +106,7 @@ def test_where_all_fail_there_are_no_figures(tmp_path):
 
 @pytest.mark.parametrize("engine", few(["compiled", "python"], "compiled"))
 def test_a_crew_can_be_stopped(engine):
-    runner = SeedRunner(
-        TrainConfig(episodes=1_000_000, backend="gym"), 3, load_model(), workers=2, engine=engine
-    )
+    runner = SeedRunner(SeedJob(TrainConfig(episodes=1_000_000, backend="gym"), engine, None), 3, 2)
     asked = itertools.count()
     for _ in runner.run(lambda: next(asked) > 3):
         pass
@@ -130,8 +128,9 @@ def test_an_unknown_engine_or_model_is_refused_before_any_work():
 
 
 def test_no_more_workers_than_seeds():
-    assert SeedRunner(CONFIG, 2, load_model(), workers=9).workers == 2
-    assert 1 <= SeedRunner(CONFIG, 999, load_model()).workers == available_cores()
+    job = SeedJob(CONFIG, "compiled", None)
+    assert SeedRunner(job, 2, 9).workers == 2
+    assert 1 <= SeedRunner(job, 999).workers == available_cores()
 
 
 def test_a_folder_holds_a_run_for_each_seed_and_the_statistics(tmp_path):

@@ -12,7 +12,7 @@ from mjcartpole.learning.episodes import Episode
 from mjcartpole.learning.evaluation import Evaluation
 from mjcartpole.physics.load import load_model, same_model
 from mjcartpole.studies import multi_seed_runs
-from mjcartpole.studies.multi_seed import SeedRunner
+from mjcartpole.studies.multi_seed import SeedJob, SeedRunner, chosen_for
 from mjcartpole.studies.seeds import ManyResult, SeedResult
 from nightly import few
 
@@ -26,8 +26,12 @@ def claim(folder, **options):
         pass
 
 
+def job(config, folder):
+    return SeedJob(config, *chosen_for(config, load_model(), "compiled"), folder, "article")
+
+
 def train_in(folder, seeds=2, config=CONFIG, **options):
-    runner = SeedRunner(config, seeds, load_model(), folder=folder, preset="article")
+    runner = SeedRunner(job(config, folder), seeds)
     with multi_seed_runs.claimed_seeds(folder, **options):
         multi_seed_runs.begin_seeds(folder, config, runner.seeds, load_model(), preset="article")
         for _ in runner.run(lambda: False):
@@ -58,7 +62,7 @@ def test_what_many_seeds_leave(tmp_path):
 
 def test_a_seed_that_is_complete_on_disk_has_the_same_evaluation(tmp_path):
     first = train_in(tmp_path / "many")
-    again = SeedRunner(CONFIG, 2, load_model(), folder=tmp_path / "many", preset="article")
+    again = SeedRunner(job(CONFIG, tmp_path / "many"), 2)
     for _ in again.run(lambda: False):
         pass
     evaluations = [[found.evaluation for found in many.seeds] for many in (first, again.result())]
@@ -214,9 +218,7 @@ def test_seeds_are_held_to_their_limits_on_resume_and_overwrite(seeds, tmp_path)
 
 def test_a_complete_seed_of_another_config_is_not_counted(tmp_path):
     train_in(tmp_path)
-    runner = SeedRunner(
-        TrainConfig(episodes=6, backend="gym", seed=2), 2, load_model(), folder=tmp_path
-    )
+    runner = SeedRunner(job(TrainConfig(episodes=6, backend="gym", seed=2), tmp_path), 2)
     for _ in runner.run(lambda: False):
         pass
     assert all("another config" in found.error for found in runner.result().failed)
@@ -234,7 +236,7 @@ def test_a_seed_that_is_a_link_is_refused_and_nothing_is_lost(overwrite, tmp_pat
         with pytest.raises(RunError, match="seed-2' is a link"):
             claim(folder, overwrite=True)
     else:
-        runner = SeedRunner(CONFIG, 2, load_model(), folder=folder)
+        runner = SeedRunner(job(CONFIG, folder), 2)
         for _ in runner.run(lambda: False):
             pass
         assert ["is a link" in found.error for found in runner.result().seeds] == [True, False]

@@ -109,11 +109,7 @@ def what_happened(casts: Casts) -> str:
 
 
 def write_sheet(casts: Casts, look: VideoOptions, path: Path, signals: StopSignals) -> None:
-    """Draw equally spaced frames of a take as one picture; print what came out.
-
-    Raises:
-        Interrupted: See `film`.
-    """
+    """Draw equally spaced frames of a take as one picture; print what came out (see `film`)."""
     with signals.deferred(), Film(casts, look) as drawn:
         picture = drawn.contact_sheet(SHEET_FRAMES)
         signals.raise_noted()

@@ -11,7 +11,7 @@ from mjcartpole.learning.config import TrainConfig
 from mjcartpole.output import FAILED
 from mjcartpole.signals import Interrupted, StopSignals
 from mjcartpole.studies import multi_seed_runs
-from mjcartpole.studies.multi_seed import SeedRunner
+from mjcartpole.studies.multi_seed import SeedJob, SeedRunner, chosen_for
 from mjcartpole.studies.multi_seed_runs import ManyBegun
 from mjcartpole.studies.seeds import ManyResult, check_seeds
 
@@ -47,18 +47,16 @@ def resume(folder: Path, how: TrainOptions) -> int:
 
 
 def _runner(begun: ManyBegun, folder: Path, how: TrainOptions) -> SeedRunner:
-    return SeedRunner(
+    job = SeedJob(
         begun.config,
-        begun.seeds,
-        begun.cartpole,
-        workers=how.workers,
-        engine=how.engine,
-        folder=folder,
-        preset=begun.preset,
-        every=how.checkpoint_every,
-        events=how.tensorboard,
-        allow_assets=how.allow_assets,
+        *chosen_for(begun.config, begun.cartpole, how.engine),
+        folder,
+        begun.preset,
+        how.checkpoint_every,
+        how.tensorboard,
+        how.allow_assets,
     )
+    return SeedRunner(job, begun.seeds, how.workers)
 
 
 def _print_head(runner: SeedRunner, begun: ManyBegun, more: str) -> None:

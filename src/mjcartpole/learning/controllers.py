@@ -115,11 +115,7 @@ def _one_step(simulation: "Simulation") -> tuple[npt.NDArray[np.float64], npt.ND
 
 
 def lqr(cartpole: "CartPole", integrator: Integrator = "gym") -> Controller:
-    """Return the linear-quadratic regulator of a model.
-
-    Raises:
-        ConfigError: See `gains`.
-    """
+    """Return the linear-quadratic regulator of a model (ConfigError: see `gains`)."""
     k = gains(cartpole, integrator).tolist()
     return Controller(
         "lqr", cartpole.poles, lambda seen: -sum(a * b for a, b in zip(k, seen, strict=True))

@@ -77,11 +77,7 @@ class Session:
             self.training.restore(checkpoint.snapshot)
 
     def save(self) -> None:
-        """Write a checkpoint now, and the greedy evaluations so far.
-
-        Raises:
-            FileError: See `run`.
-        """
+        """Write a checkpoint now, and the greedy evaluations so far (FileError: see `run`)."""
         snapshot = self.training.snapshot()
         config = self.training.config
         save_checkpoint(self._folder, Checkpoint(config, self._model, snapshot))

@@ -35,8 +35,14 @@ class SeedJob:
     """One seed's training, in a form that another process can be given.
 
     Attributes:
+        config: What to train.
+        engine: Who runs the loop.
         document: The model's, where it is loaded already.
-        folder: The run's; None keeps nothing.
+        folder: The run's, or that of many runs, `seed-<n>`; None keeps nothing.
+        preset: Name of the preset that the config began from.
+        every: Seconds between two checkpoints.
+        events: Whether TensorBoard events are written.
+        allow_assets: Folders in which the files of the models of runs that go on may lie.
         evaluated: Whether greedy episodes are played when it is over; always where it is kept.
     """
 
@@ -67,33 +73,18 @@ class SeedRunner:
     """
 
     def __init__(
-        self,
-        config: TrainConfig,
-        seeds: int | Sequence[int],
-        cartpole: CartPole,
-        *,
-        workers: int | None = None,
-        engine: Engine = "compiled",
-        folder: Path | None = None,
-        preset: str = "tuned",
-        every: float = CHECKPOINT_EVERY,
-        events: bool = False,
-        allow_assets: tuple[Path, ...] = (),
+        self, job: SeedJob, seeds: int | Sequence[int], workers: int | None = None
     ) -> None:
-        """Plan the work: these seeds, or so many from the config's own on, for the config's model.
+        """Plan the job with these seeds, or so many from its own on; runs that are there go on.
 
-        The folder keeps a run per seed, `seed-<n>`; those that are there go on, and the files of
-        their models may also lie in `allow_assets`. Without `workers`, as many are at work at once
-        as there are cores. A checkpoint is saved after `every` so many seconds, and TensorBoard
-        events if they are asked for.
+        As many are at work at once as there are cores, if `workers` is left out.
 
         Raises:
             ConfigError: The seeds or workers make no sense.
         """
-        self.seeds = check_seeds(config, seeds)
+        self.seeds = check_seeds(job.config, seeds)
         self.workers = worker_count(workers, len(self.seeds))
-        by = chosen_for(config, cartpole, engine)
-        self._job = SeedJob(config, *by, folder, preset, every, events, allow_assets)
+        self._job = job
         self._found: dict[int, SeedResult] = {}
 
     def run(self, stop: Stop) -> Iterator[SeedResult | None]:
@@ -159,9 +150,8 @@ def train_many(
     """
     cartpole = config.load_model()
     training_grid(config, cartpole)
-    runner = SeedRunner(
-        config, seeds, cartpole, workers=workers, engine=engine, folder=run_dir, preset="custom"
-    )
+    job = SeedJob(config, *chosen_for(config, cartpole, engine), run_dir)
+    runner = SeedRunner(job, seeds, workers)
     if run_dir is None:
         return _finished(runner)
     check_storable(cartpole)
