@@ -98,7 +98,14 @@ def test_an_edit_replaces_that_of_the_preset_and_leaves_the_others():
         "hinge.damping=0.1",
     )
     base = {"set": ("gravity=3", "pole.mass=0.2")}
-    assert config_of(base, {"gravity": 5}, 0).set == ("gravity=5", "pole.mass=0.2")
+    assert config_of(base, {"force": 5}, 0).set == (
+        "gravity=3.0",
+        "pole.mass=0.2",
+        "force=5",
+    )
+    for here, there in ((base, {"gravity": 5}), ({"gravity": 5}, base)):
+        with pytest.raises(ConfigError, match="gravity stands in set and by itself; give it once"):
+            config_of(here, there, 0)
 
 
 def test_a_method_takes_of_the_base_what_it_has_and_refuses_what_a_point_gives():

@@ -67,6 +67,13 @@ def test_a_file_means_what_it_says(tmp_path):
         ("[factors]\nalpha = {low = 0, high = 1, log = true}", "needs a range above 0"),
         ("[factors]\nalpha = {low = -inf, high = 1, levels = 3}", "low below high"),
         ("[factors]\nalpha = {low = 0, high = 1}", "a grid needs levels = N"),
+        ("[factors]\nalpha = [0.1, 0.2, 0.10]", "alpha has the level 0.1 more than once"),
+        ("[factors]\nepisodes = {low = 1, high = 3, levels = 9}", "only 3 of 9"),
+        (
+            "[study]\ndesign = 'latin'\nsamples = 3\n"
+            "[factors]\nalpha = {low = 0, high = 1, levels = 3}",
+            'levels = N is for a grid; design = "latin" draws from all of a range',
+        ),
         ("[factors]\nalpha = {low = 0, hihg = 1}", "did you mean 'high'?"),
         ("[factors]\nalpha = {low = 0, high = 1, levels = 1}", "a whole number from 2 up"),
         ("[factors]\nmethod = {low = 0, high = 1}", "method is no number"),
@@ -105,9 +112,14 @@ def test_all_mistakes_are_told_at_once():
         [factors]
         alpa = [1]
         gamma = []
+        [study]
+        measure = "robust_mean"
+        [robustness]
+        nosie = 1
+        noise = "x"
         """
     )
-    assert len(lines) == 4
+    assert len(lines) == 6
     names = "".join(f"x{n} = [1]\n" for n in range(99))
     many = mistakes(f"[factors]\n{names}")
     assert len(many) == 21 and many[-1] == "and 79 mistakes more"

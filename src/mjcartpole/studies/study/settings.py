@@ -104,8 +104,10 @@ def config_of(settings: Mapping[str, Any], given: Mapping[str, Any], seed: int) 
     method = merged.get("method", PRESETS[preset].get("method", TrainConfig.method))
     has = config_class(method).fields()
     if edits:
-        before = edits_of(merged.get("set", PRESETS[preset].get("set", ()))) | edits
-        merged["set"] = tuple(f"{name}={value}" for name, value in before.items())
+        before = edits_of(merged.get("set", PRESETS[preset].get("set", ())))
+        if both := sorted(before.keys() & edits) if "set" in merged else []:
+            raise ConfigError(f"{both[0]} stands in set and by itself; give it once")
+        merged["set"] = tuple(f"{name}={value}" for name, value in {**before, **edits}.items())
     fields = {name: value for name, value in merged.items() if name in has or name in given}
     return TrainConfig.preset(preset, **fields, seed=seed)
 

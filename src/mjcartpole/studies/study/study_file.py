@@ -25,7 +25,13 @@ from mjcartpole.files import brief, read_bytes
 from mjcartpole.studies.seeds import MAX_SEEDS
 from mjcartpole.studies.study.design import MOST_POINTS, Design, Factor, Range
 from mjcartpole.studies.study.measures import MEASURES, is_disturbed
-from mjcartpole.studies.study.settings import check_setting, is_number, is_whole, read_value
+from mjcartpole.studies.study.settings import (
+    as_text,
+    check_setting,
+    is_number,
+    is_whole,
+    read_value,
+)
 
 MOST_BYTES: Final = 2**20
 MOST_MISTAKES: Final = 20
@@ -163,9 +169,11 @@ def _factor(name: str, value: Any) -> Factor:  # noqa: ANN401
             f"{name} must be a list of levels or a range such as {{low = 0.01, high = 1}}, not "
             f"{value!r}; what is the same for all belongs to [base]"
         )
-    levels = tuple(dict.fromkeys(read_value(name, each) for each in value))
+    levels = tuple(read_value(name, each) for each in value)
     if not levels:
         raise ConfigError(f"{name} has no levels, so there is no point; give one at least")
+    if twice := [each for each in dict.fromkeys(levels) if levels.count(each) > 1]:
+        raise ConfigError(f"{name} has the level {as_text(twice[0])} more than once; give it once")
     return Factor(name, levels)
 
 
@@ -186,7 +194,12 @@ def _range(name: str, value: dict[str, Any]) -> Range:
         raise ConfigError(f"{name}: log is true or false, and needs a range above 0")
     if levels is not None and not (type(levels) is int and 2 <= levels <= MOST_POINTS):
         raise ConfigError(f"{name}: levels must be a whole number from 2 up, not {levels!r}")
-    return Range(*numbers, log=log, whole=is_whole(name), levels=levels)
+    found = Range(*numbers, log=log, whole=is_whole(name), levels=levels)
+    if levels is not None and len(different := set(found.evenly())) < levels:
+        raise ConfigError(
+            f"{name}: there are not so many different levels, only {len(different)} of {levels}"
+        )
+    return found
 
 
 def _about(table: Mapping[str, Any], mistakes: list[str]) -> dict[str, Any]:
@@ -200,10 +213,13 @@ def _about(table: Mapping[str, Any], mistakes: list[str]) -> dict[str, Any]:
 def _robustness(table: Mapping[str, Any], mistakes: list[str]) -> Disturbances | None:
     if not table:
         return None
+
+    def read(name: str, value: Any) -> Any:  # noqa: ANN401
+        check_known("disturbance", name, [each.name for each in fields(Disturbances)])
+        return read_value(name, value)
+
     try:
-        for name in table:
-            check_known("disturbance", name, [each.name for each in fields(Disturbances)])
-        return Disturbances(**{name: read_value(name, value) for name, value in table.items()})
+        return Disturbances(**dict(_each(table, "robustness", read, mistakes)))
     except ConfigError as error:
         mistakes.append(f"[robustness] {error}")
         return Disturbances()
@@ -275,6 +291,11 @@ def _together(study: Study) -> Iterator[str]:
             yield (
                 f"[factors] {factor.name}: a grid needs levels = N in a range; or give "
                 'design = "latin" and samples in [study]'
+            )
+        if isinstance(factor.levels, Range) and not ranged and study.design != "grid":
+            yield (
+                f"[factors] {factor.name}: levels = N is for a grid; "
+                f'design = "{study.design}" draws from all of a range'
             )
         if factor.name in study.base:
             yield f"{factor.name} stands in [base] and in [factors]; give it once"
