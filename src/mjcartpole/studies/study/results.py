@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from mjcartpole.errors import RunError, check_known
+from mjcartpole.errors import ConfigError, RunError, check_known
 from mjcartpole.files import brief, is_file, read_bytes
 from mjcartpole.studies.study.design import Factor, Range, points_of
 from mjcartpole.studies.study.folder import STUDY
@@ -22,6 +22,7 @@ from mjcartpole.studies.study.study_file import Study, read_study
 from mjcartpole.studies.study.tables import RUNS
 
 MOST_BYTES: Final = 2**30
+_AGAIN: Final = "mjcartpole study FILE.toml --resume"
 PARTS: Final = 4
 """Of a factor that is a range, and has no levels of its own."""
 
@@ -82,10 +83,14 @@ class Results:
         """
         found = {each.name: each.names[0] for each in self.levels}
         found |= {name: as_text(level) for name, level in self.study.baseline.items()}
+        asked = dict[str, str]()
         for text in given:
             name, _, level = text.partition("=")
             check_known("factor", name, found)
-            found[name] = level
+            if name in asked:
+                raise ConfigError(f"--baseline has two levels of {name}; give one")
+            asked[name] = level
+        found |= asked
         for each in self.levels:
             check_known(f"{each.name}: level", found[each.name], each.names)
         return found
@@ -101,7 +106,7 @@ def read_results(folder: Path) -> Results:
         if not is_file(folder / name):
             raise RunError(
                 f"'{folder}' has no {name}; give the folder of a study that is done, or go on with "
-                "it: mjcartpole study FILE.toml --resume"
+                f"it: {_AGAIN}"
             )
     study = read_study(folder / STUDY)
     try:
@@ -111,10 +116,9 @@ def read_results(folder: Path) -> Results:
             return _results(study, good, len(rows) - len(good))
     except (ValueError, KeyError, TypeError, csv.Error) as error:
         raise RunError(
-            f"'{folder / RUNS}' is no table of this study ({brief(error)}); write it anew: "
-            "mjcartpole study FILE.toml --resume"
+            f"'{folder / RUNS}' is no table of this study ({brief(error)}); write it anew: {_AGAIN}"
         ) from error
-    first = f"; the first failed: {rows[0]['error']}" if rows else ""
+    first = f"; the first failed: {rows[0]['error']}" if rows else f"; go on with it: {_AGAIN}"
     raise RunError(f"no run in '{folder / RUNS}' was done without an error{first}")
 
 
