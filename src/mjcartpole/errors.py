@@ -92,17 +92,11 @@ class RenderError(MjCartPoleError):
 def check_known(
     kind: str, name: object, available: Iterable[object], error: type[MjCartPoleError] = ConfigError
 ) -> None:
-    """Refuse a name that is none of those there are.
+    """Refuse a name that is none of those there are, of the kind of thing that it names.
 
     >>> check_known("engine", "fast", ("compiled", "python"))
     Traceback (most recent call last):
     mjcartpole.errors.ConfigError: engine 'fast' is unknown; available: compiled, python
-
-    Args:
-        kind: What it names.
-        name: What was asked for.
-        available: All that may be asked for.
-        error: What is raised; a `ConfigError` unless it says otherwise.
     """
     names = list(available)
     if name in names:

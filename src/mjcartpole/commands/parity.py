@@ -42,10 +42,9 @@ class Parity(Command):
     """Write every figure to this file."""
 
     def run(self) -> int:
-        """Climb the ladder and print each rung as it is found.
+        """Climb the ladder and print each rung as it is found; return the exit code.
 
-        Returns:
-            0 where the motion holds (with `strict`, where no number differs either), else 1.
+        It is 0 where the motion holds (with `strict`, where no number differs either), else 1.
         """
         from mjcartpole.physics.load import load_model
         from mjcartpole.physics.simulation import silence_mujoco

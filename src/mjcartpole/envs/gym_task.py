@@ -20,13 +20,8 @@ Observation = npt.NDArray[np.float32]
 class GymTask(gymnasium.Wrapper[Observation, np.int64, Observation, np.int64]):
     """CartPole-v1's equations with the limits, starting states and rewards of a task.
 
-    Args:
-        env: Gymnasium's environment, with the task's time limit.
-        task: The rules.
-        disturbances: What is added.
-
-    Attributes:
-        disturber: Adds them; None where nothing is added.
+    The wrapped environment has the task's time limit. `disturber` adds the disturbances; it is None
+    where nothing is added.
     """
 
     def __init__(

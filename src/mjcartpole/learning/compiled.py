@@ -96,14 +96,11 @@ class CompiledLoop:
         numbers: range,
         chance: Chance | None = None,
     ) -> Iterator[int]:
-        """Do what `learn_episodes` does, chunk by chunk.
+        """Do what `learn_episodes` does, chunk by chunk; yield how many episodes the log then has.
 
         The learner's table and generator are changed in place; `env_rng` draws the starting states,
         `chance` disturbances, where there are some. The log takes the episodes `numbers`, counted
         from 0, which decide what the schedules give; it holds those before.
-
-        Yields:
-            The number of episodes in the log.
 
         Raises:
             SimulationError: The physics diverged; names episode and step.

@@ -101,13 +101,10 @@ def play_episode(
     seed: int | None = None,
     start: Sequence[float] | None = None,
 ) -> tuple[Episode, list[State]]:
-    """Play one episode without learning.
+    """Play one episode without learning; return it, and its states from the first to the last.
 
     The policy goes from an observation, float32 of shape (4,), to an action. The episode has its
     number for the record; it begins in `start`, or in a state that is drawn, seeded if need be.
-
-    Returns:
-        The episode, and its states from the first to the last, each float64 of shape (4,).
     """
     observation = env.reset(seed=seed)[0] if start is None else _begin_at(env, start)
     states = [_state_of(env)]

@@ -51,10 +51,7 @@ class Session:
         self._model = checksum(cartpole.stored[0])
 
     def run(self, stop: Callable[[], bool]) -> Iterator[int]:
-        """Train until the end, or until `stop()` is true.
-
-        Yields:
-            The number of finished episodes, after each chunk.
+        """Train until the end, or until `stop()` is true; yield the episodes done at each chunk.
 
         Raises:
             FileError: A checkpoint cannot be written; the last good one is still there.

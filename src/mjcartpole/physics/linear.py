@@ -18,10 +18,9 @@ _REST: Final = np.zeros(4)
 
 
 def linearisation(p: Parameters) -> tuple[Array, Array]:
-    """Return a and B of `state_dot = A state + B force` near rest at angle 0.
+    """Return A, shape (4, 4), and B, shape (4, 1), of `state_dot = A state + B force`; SI units.
 
-    Returns:
-        A, shape (4, 4), and B, shape (4, 1); SI units.
+    They hold near rest at angle 0.
     """
     by_state = _jacobian(lambda states: derivative(p, states, 0.0), _REST)
     by_force = derivative(p, _REST, np.asarray(1j * _H)).imag / _H

@@ -122,9 +122,7 @@ def _frictions(cartpole: CartPole) -> dict[int, DryFriction]:
 def geometry_of(cartpole: CartPole, up: Vector | None = None) -> dict[str, Any]:
     """Return the parameters that say where the axes and the pole point; what rounding makes is 0.
 
-    Args:
-        cartpole: A model of one pole.
-        up: Unit, shape (3,); against gravity if None.
+    `up` is a unit vector, shape (3,); against gravity if it is left out.
     """
     axes, gravity = directions(cartpole), cartpole.model.opt.gravity
     if up is None:

@@ -172,10 +172,9 @@ class _Search:
         return max(steps, more) if side and side == other else 0
 
     def _pushed(self, start: State, control: float, place: int, limit: float) -> tuple[int, int]:
-        """Find to which side a steady push drives a value of the state out, and when.
+        """Find to which side a steady push drives a value of the state out, and in how many steps.
 
-        Returns:
-            -1 or 1, or 0 where it stays or the cart's place plays a part; and control steps.
+        The side is -1 or 1, or 0 where it stays or the cart's place plays a part.
         """
         self.simulation.set_state(start)
         for done in range(1, self.task.time_limit + 1):

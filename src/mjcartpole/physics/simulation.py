@@ -99,22 +99,16 @@ class Simulation:
             self._qpos[joint], self._qvel[joint] = state[place], state[place + 1]
 
     def steps(self, states: Vector, controls: Vector) -> Vector:
-        """Return the states after one control step from each of many.
-
-        Args:
-            states: Shape (n, size).
-            controls: Shape (n,).
-        """
+        """Return the states after one control step from each of many, shape (n, size)."""
         after = np.empty_like(states)
         for index, control in self._each(states, controls):
             after[index] = self.step(control)
         return after
 
     def accelerations(self, states: Vector, controls: Vector) -> Vector:
-        """Return MuJoCo's accelerations in each of many states; for the arguments see `steps`.
+        """Return MuJoCo's `(x_acc, theta_acc, …)` in each of many states, shape (n, size / 2).
 
-        Returns:
-            `(x_acc, theta_acc, …)`, shape (n, size / 2): m/s^2, rad/s^2.
+        They are in m/s^2 and rad/s^2.
         """
         where = list(self.cartpole.joints)
         found = np.empty((len(states), len(where)))

@@ -283,11 +283,7 @@ def check_independent(cartpole: CartPole, data: mujoco.MjData) -> None:
 
 
 def check_limits(cartpole: CartPole) -> None:
-    """Refuse joints whose limits keep them from position 0, where episodes start.
-
-    Raises:
-        UnfitError: As said.
-    """
+    """Refuse joints whose limits keep them from position 0, where episodes start (UnfitError)."""
     model = cartpole.model
     for joint in cartpole.joints:
         on_rail = joint == cartpole.slider

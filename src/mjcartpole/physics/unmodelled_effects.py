@@ -113,10 +113,8 @@ def _steps_as(cartpole: CartPole, method: str, region: FreeRegion) -> bool:
 def overridden_masses(cartpole: CartPole) -> list[str]:
     """Return masses that the document gives to geoms and that an explicit `<inertial>` overrides.
 
-    They change nothing in the motion, whatever the person who wrote them expected.
-
-    Returns:
-        One phrase each; empty if there are none, or if the document cannot be read alone.
+    They change nothing in the motion, whatever the person who wrote them expected. One phrase
+    each; none if the document cannot be read alone.
     """
     try:
         spec = mujoco.MjSpec.from_string(cartpole.xml)
@@ -152,11 +150,7 @@ def differs_from(
 
 
 def idle_numbers(cartpole: CartPole, *, task: Task = CARTPOLE_V1) -> list[str]:
-    """Name numbers in a model of one pole that no episode feels, whatever was meant by them.
-
-    Returns:
-        One phrase each.
-    """
+    """Name numbers in a model of one pole that no episode feels, whatever was meant by them."""
     model, bit, region = cartpole.model, mujoco.mjtDisableBit, free_region(cartpole, task=task)
     found = list(region.bounds) if region.covers_task else []
     for joint in cartpole.joints:

@@ -18,10 +18,8 @@ def finish_training(
 ) -> tuple[TrainResult, dict[str, Any], Evaluation | None]:
     """Write what a training has come to and, if it is over, how well its policy plays.
 
-    The run folder stores the model; TensorBoard events are written as well if asked for.
-
-    Returns:
-        The result, the summary as it was written, and the evaluation; None if it is not over.
+    The run folder stores the model; TensorBoard events are written as well if asked for. Returns
+    the result, the summary as it was written, and the evaluation, None if it is not over.
 
     Raises:
         FileError: The folder cannot be written.

@@ -90,8 +90,7 @@ class SeedRunner:
     def run(self, stop: Stop) -> Iterator[SeedResult | None]:
         """Train all seeds, or until `stop()` is true.
 
-        Yields:
-            Each seed's result when it has come, and None now and then while waiting.
+        Yields each seed's result when it has come, and None now and then while waiting.
         """
         jobs = (self._job.of(seed) for seed in self.seeds)
         # The compiled engine leaves Python's lock alone.

@@ -27,22 +27,14 @@ Found = Generator[tuple[Job, Future[Result]] | None, None, None]
 def side_by_side(
     work: Work[Job, Result], jobs: Iterable[Job], workers: int, stop: Stop, *, threads: bool
 ) -> Found[Job, Result]:
-    """Do jobs, so many at once, in threads or in processes of their own.
-
-    Yields:
-        See `Found`.
-    """
+    """Do jobs, so many at once, in threads or in processes of their own."""
     return (_in_threads if threads else _in_processes)(work, jobs, workers, stop)
 
 
 def as_they_come(
     submit: Callable[[Job], Future[Result]], jobs: Iterable[Job], at_once: Callable[[], int]
 ) -> Found[Job, Result]:
-    """Submit jobs, so many ahead at a time.
-
-    Yields:
-        See `Found`.
-    """
+    """Submit jobs, so many ahead at a time."""
     left, waiting = iter(jobs), dict[Future[Result], Job]()
     while True:
         for job in itertools.islice(left, max(0, at_once() - len(waiting))):

@@ -149,8 +149,7 @@ def edit_document(
 def describe_edits(before: str, after: str) -> list[str]:
     """Return what differs between two documents of the same elements, attribute by attribute.
 
-    Returns:
-        Lines such as 'geom:pole.size: 0.03 → 0.05'; where elements were added, one line says so.
+    Lines are such as 'geom:pole.size: 0.03 → 0.05'; where elements were added, one line says so.
     """
     lines = []
     old, new = Document(before).elements, Document(after).elements

@@ -63,12 +63,7 @@ class Parts:
         """
         model = self._model
         body = int(model.jnt_bodyid[index])
-        found = self.body(body).find("joint")
-        if len(found) != int(model.body_jntnum[body]):
-            raise ConfigError(
-                f"the joints of body {model.body(body).name!r} cannot be edited by meaning: not "
-                "all of them are in the document; edit by element"
-            )
+        found = self._all_in(body, "joint", int(model.body_jntnum[body]))
         return found[index - int(model.body_jntadr[body])]
 
     def geoms(self, body: int) -> list[tuple[int, Element, mujoco.MjsGeom]]:
@@ -78,14 +73,8 @@ class Parts:
             ConfigError: Some are not written in the body.
             ModelSyntaxError: An edit has left a number that MuJoCo does not read.
         """
-        model = self._model
-        elements = self.body(body).find("geom")
-        first = int(model.body_geomadr[body])
-        if len(elements) != int(model.body_geomnum[body]):
-            raise ConfigError(
-                f"the geoms of body '{model.body(body).name}' cannot be edited by meaning: not all "
-                "of them are in the document; edit by element"
-            )
+        elements = self._all_in(body, "geom", int(self._model.body_geomnum[body]))
+        first = int(self._model.body_geomadr[body])
         try:
             # No geom that is asked for was edited before.
             spec = _read(self.cartpole.xml if self.in_one else self.document.text)
@@ -93,6 +82,16 @@ class Parts:
             raise invalid("the edited document", error) from error
         whole = [geom for each in spec.bodies for geom in each.geoms]
         return [(first + i, element, whole[first + i]) for i, element in enumerate(elements)]
+
+    def _all_in(self, body: int, tag: str, count: int) -> list[Element]:
+        """Return as many elements of a tag as a body has in the model; refuse fewer or more."""
+        found = self.body(body).find(tag)
+        if len(found) != count:
+            raise ConfigError(
+                f"the {tag}s of body '{self._model.body(body).name}' cannot be edited by meaning: "
+                "not all of them are in the document; edit by element"
+            )
+        return found
 
     def motor(self) -> Element:
         """Return the element of the motor that the actions control."""

@@ -124,10 +124,7 @@ def check_versions(there: Mapping[str, str], here: Mapping[str, str], where: str
 
 @contextlib.contextmanager
 def connected(address: str) -> Iterator[Any]:
-    """Connect to a scheduler, and check its workers.
-
-    Yields:
-        Dask's client.
+    """Connect Dask's client to a scheduler, and check its workers.
 
     Raises:
         ConfigError: It does not answer, or a worker has other versions.

@@ -47,10 +47,9 @@ def _do(run: tuple[str, SeedJob, Disturbances | None], stop: Stop) -> Record | N
 
 
 def keep(found: Found[Any, Record | None], log: RecordLog) -> Generator[Record | None, None, None]:
-    """Write each result into the log as it comes.
+    """Write each result into the log as it comes, and yield it, or None now and then while waiting.
 
-    Yields:
-        It, and None now and then while waiting. A run whose process was killed has no result.
+    A run whose process was killed has no result.
 
     Raises:
         FileError: The log cannot be written.
