@@ -85,7 +85,7 @@ def test_a_plot_and_its_data(kind, here, capsys):
 
 @pytest.mark.long
 def test_nothing_is_replaced_unless_it_is_asked_for(here, capsys):
-    assert "plots/one-and-1-others-curve.png" in call(["plot", "curve", "one", "many"], capsys)[1]
+    assert "plots/one-and-1-other-curve.png" in call(["plot", "curve", "one", "many"], capsys)[1]
     for expected in ("plots/one-curve.png", "plots/one-curve-2.png"):
         assert call(["plot", "curve", "one"], capsys)[1] == f"plot   {expected}\n"
     Path("a.svg").write_text("mine")
@@ -109,6 +109,9 @@ def test_nothing_is_replaced_unless_it_is_asked_for(here, capsys):
         (["table", "one", "many"], "plot table is for one run, not 2"),
         (["table", "one", "--dims", "x,y"], "dimension 'y' is unknown"),
         (["basin", "one", "--at", "x=far"], "--at 'x=far' makes no sense; give NAME=VALUE"),
+        (["basin", "one", "--at", "x=inf"], "x is held at a number up to 1e+10, not inf"),
+        (["table", "one", "--at", "x=nan"], "x is held at a number up to 1e+10, not nan"),
+        (["table", "one", "--at", "x=1", "x=2"], "--at holds a dimension at one value"),
         (["phase", "one", "--episodes", "0"], "episodes must be a whole number from 1 up"),
         (["basin", "one", "--points", "1"], "points must be a whole number from 2"),
     ],

@@ -152,6 +152,7 @@ def test_four_policies_on_six_models_take_less_than_a_minute(policies, tmp_path)
         ({"models": ["gym"], "sweep": "gravity=1:2:1"}, ConfigError, "cannot be swept"),
         ({"sweep": "gravity"}, ConfigError, "no sweep"),
         ({"models": ["gym"], "vary": ("force=8:12",)}, ConfigError, "change nothing there"),
+        ({"models": ["gym"], "integrator": "mujoco"}, ConfigError, "change nothing there"),
         ({"sweep": "delay=0:1:0.5"}, ConfigError, "whole number"),
         ({"models": ["cartpole"], "hold": 2.0}, ConfigError, "hold must be from 0 to 1"),
         ({"episodes": 0, "models": ["cartpole"]}, ConfigError, "episodes"),

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Final, Literal
 import tyro
 
 from mjcartpole.commands.options import Command, OutputPath, UsageError
+from mjcartpole.commands.printing import counted
 from mjcartpole.errors import ConfigError, RenderError
 from mjcartpole.files import check_free, check_writable, csv_text, free_path, write_whole
 from mjcartpole.packages import check_installed
@@ -88,7 +89,10 @@ class Plot(Command):
                 raise UsageError(f"--{name} is for plot {kinds}, not for plot {self.kind}")
         if not self.sources:
             raise UsageError(f"plot {self.kind} needs a RUN; see mjcartpole plot --help")
-        return asked | ({"at": dict(map(_held, self.at))} if self.at else {})
+        held = dict(map(_held, self.at))
+        if len(held) < len(self.at):
+            raise UsageError("--at holds a dimension at one value; give each once")
+        return asked | ({"at": held} if held else {})
 
     def _checked_path(self) -> Path:
         """Return where the plot goes, if it and its data may be written."""
@@ -110,7 +114,7 @@ class Plot(Command):
 
         first, *others = self.sources
         named = first.resolve().parent if first.name == POLICY else first.resolve()
-        more = f"-and-{len(others)}-others" if others else ""
+        more = f"-and-{counted(len(others), 'other')}".replace(" ", "-") if others else ""
         path = PLOTS / f"{shortened(named.name, 200)}{more}-{self.kind}.png"
         return path if self.overwrite else free_path(path)
 

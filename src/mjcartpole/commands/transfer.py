@@ -73,10 +73,11 @@ class Transfer(RuleChanges, DisturbanceChanges, Command):
 
         fitting = [name for name in _fitting(policies) if name != GYM or not self.vary]
         chosen = dict.fromkeys(self.models or fitting)
-        if set(chosen) == {GYM} and (self.set or self.own_timestep or self.vary):
+        others = self.set or self.own_timestep or self.vary or self.integrator != "gym"
+        if set(chosen) == {GYM} and others:
             raise ConfigError(
-                "gym is gymnasium's own cart-pole: --set, --own-timestep and --vary change nothing "
-                "there"
+                "gym is gymnasium's own cart-pole: --set, --own-timestep, --integrator and --vary "
+                "change nothing there"
             )
         physics = {**self._physics, "disturbances": self.added_to(NONE)}
         places = [find_place(model, self.set, **physics) for model in chosen]

@@ -192,8 +192,8 @@ class Disturbances(WorldDisturbances):
             if getattr(self, name) >= task.time_limit:
                 raise ConfigError(
                     f"{name} of {getattr(self, name)} control steps is no shorter than an episode "
-                    f"of {task.name}, which has {task.time_limit}; take a shorter one, or a task "
-                    "with longer ones: with_changes(max_episode_steps=…)"
+                    f"of {task.name}, which has {task.time_limit}; take a shorter one, or more "
+                    "max_episode_steps"
                 )
 
     def effects(self, poles: int, control_step: float, task: Task) -> tuple["Effects", list[float]]:

@@ -11,6 +11,7 @@ from mjcartpole.errors import ConfigError, check_known
 from mjcartpole.learning.discretizer import Discretizer
 from mjcartpole.learning.many_states import actions_in, homes_in, values_in
 from mjcartpole.media.grid_plot import Field, Grid, Kind
+from mjcartpole.rules import FARTHEST
 from mjcartpole.task import N_ACTIONS, state_names
 
 Floats = npt.NDArray[np.float64]
@@ -80,6 +81,9 @@ def choose_axes(
         raise ConfigError(f"dims needs two different dimensions of {', '.join(names)}")
     if over in chosen or set(at) & {*chosen, over}:
         raise ConfigError("a dimension is shown, differs from slice to slice, or is held: once")
+    for name, value in at.items():
+        if not abs(value) <= FARTHEST:
+            raise ConfigError(f"{name} is held at a number up to {FARTHEST:g}, not {value!r}")
     others = [name for name in names if name not in {*chosen, *at}]
     if over is None:
         used = [name for name in others if grid.bins[names.index(name)] > 1]
