@@ -119,6 +119,9 @@ def test_policies_are_played_by_what_is_asked_for(changed, here, capsys):
         (["train", "--start-angle", "3"], "all beyond theta_limit"),
         (["train", "--reward", "uprigt"], "did you mean 'upright'?"),
         (["evaluate", "--policy", "lqr", "--start-low", "1"], "start_low (1) is above start_high"),
+        (["train", "--task", ""], "task '' is unknown; available: CartPole-v1"),
+        (["evaluate", "--policy", "lqr", "--task", ""], "task '' is unknown"),
+        (["evaluate", "--policy", "lqr", "--model", ""], "no model is called ''"),
         (["transfer", "--policy", "lqr", "--theta-limit", "nan"], "theta_limit must be"),
     ],
 )

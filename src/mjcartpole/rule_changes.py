@@ -40,4 +40,4 @@ class RuleChanges:
         Raises:
             ConfigError: There is no such task, or a rule makes no sense.
         """
-        return resolve(self.task or otherwise, **self.changes)
+        return resolve(otherwise if self.task is None else self.task, **self.changes)

@@ -36,7 +36,7 @@ def run(file: Path, folder: Path, how: StudyOptions) -> int:
     silence_mujoco()
     worker_count(how.workers, 1)  # What makes no sense is refused before a folder is claimed.
     planned, signals = plan(read_study(file), how.engine), StopSignals()
-    cluster = connected(how.scheduler) if how.scheduler else contextlib.nullcontext()
+    cluster = connected(how.scheduler) if how.scheduler is not None else contextlib.nullcontext()
     with signals.caught(), cluster as client:
         if how.dry_run:
             return _dry_run(planned, folder, how, threads_of(client) if client else how.workers)

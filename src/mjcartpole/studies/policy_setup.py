@@ -134,7 +134,8 @@ def _placed(
         # Gymnasium's cart-pole has neither; only what the user asks for is held against that.
         own_model = "cartpole"
         config = TrainConfig(backend="gym", task=config.rules)
-    model, integrator = target.model or own_model, target.integrator or config.integrator
+    model = own_model if target.model is None else target.model
+    integrator = target.integrator or config.integrator
     asked = *target.set, *disturbances.vary
     check_backend(backend, model, integrator, asked, own_timestep=target.own_timestep)
     own_timestep = config.own_timestep or target.own_timestep
