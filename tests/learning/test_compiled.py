@@ -12,6 +12,7 @@ import pytest
 from gymnasium.utils import seeding
 
 from engines import DIVERGING, ENGINES, TOUCHING, edited, outcome, python, random_policy, write
+from mjcartpole.envs.backend import World
 from mjcartpole.errors import SimulationError
 from mjcartpole.learning import compiled
 from mjcartpole.learning.compiled import CompiledLoop
@@ -47,14 +48,14 @@ def test_a_chunk_is_as_long_as_its_physics_steps_take():
     """Ctrl-C, progress and whoever watches wait for a chunk."""
     lengths = []
     for timestep in (0.02, 0.0002, 0.00002):
-        loop = CompiledLoop("mujoco", load_model("cartpole", {"timestep": timestep}), "gym")
+        loop = CompiledLoop(World("mujoco", load_model("cartpole", {"timestep": timestep})))
         lengths.append(loop._chunk)
     assert lengths == [compiled.CHUNK_STEPS, compiled.CHUNK_STEPS // 100, 50]
 
 
 def test_a_loop_forgets_that_its_physics_diverged():
     """Whoever goes on hears of what is found this time, not of the last time."""
-    loop = CompiledLoop("mujoco", load_model(DIVERGING["NaN, later"]), "gym")
+    loop = CompiledLoop(World("mujoco", load_model(DIVERGING["NaN, later"])))
     drifting = train(TrainConfig(episodes=200, seed=3)).policy
     with pytest.raises(SimulationError):
         loop.play(drifting, seeding.np_random(0)[0], 500)

@@ -25,10 +25,10 @@ class World(NamedTuple):
     """Where episodes are played, as `make_env` and the compiled loop take it; all of it checked."""
 
     backend: Backend
-    model: "ModelLike"
-    integrator: Integrator
-    task: Task
-    disturbances: Disturbances
+    model: "ModelLike" = "cartpole"
+    integrator: Integrator = "gym"
+    task: Task = CARTPOLE_V1
+    disturbances: Disturbances = NONE
 
 
 def check_backend(

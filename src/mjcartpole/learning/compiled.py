@@ -11,10 +11,9 @@ import numpy.typing as npt
 from numba.core import config, event
 
 from mjcartpole.disturbances.contexts import Chance
-from mjcartpole.disturbances.disturbances import NONE, Disturbances
-from mjcartpole.envs.backend import Backend
+from mjcartpole.disturbances.disturbances import NONE
+from mjcartpole.envs.backend import Backend, World
 from mjcartpole.errors import SimulationError
-from mjcartpole.integrator import Integrator
 from mjcartpole.learning import kernels
 from mjcartpole.learning.compiling import compiling
 from mjcartpole.learning.discretizer import Grid
@@ -28,7 +27,7 @@ from mjcartpole.learning.policy import Policy
 from mjcartpole.learning.worlds import Worlds
 from mjcartpole.physics.cartpole import CartPole
 from mjcartpole.physics.library import libmujoco
-from mjcartpole.physics.load import ModelLike, load_model
+from mjcartpole.physics.load import load_model
 from mjcartpole.physics.simulation import check_sane
 from mjcartpole.task import CARTPOLE_V1, Task
 
@@ -57,16 +56,8 @@ def unavailable(
 class CompiledLoop:
     """Plays episodes of one backend, with or without learning."""
 
-    def __init__(
-        self,
-        backend: Backend,
-        model: ModelLike,
-        integrator: Integrator,
-        task: Task = CARTPOLE_V1,
-        disturbances: Disturbances = NONE,
-        fitted: Fitted | None = None,
-    ) -> None:
-        """Load the model; the first five are those of a `World` whose backend is not `unavailable`.
+    def __init__(self, world: World, fitted: Fitted | None = None) -> None:
+        """Load the model of a world whose backend is not `unavailable`.
 
         A model that was `fitted` takes the place of the world; nothing disturbs that one.
 
@@ -74,6 +65,7 @@ class CompiledLoop:
             ModelError: The model cannot be used.
             ConfigError: A disturbance makes no sense for it.
         """
+        backend, model, integrator, task, disturbances = world
         cartpole = load_model(model) if backend == "mujoco" else None
         self._worlds = Worlds(cartpole, integrator, task, NONE if fitted else disturbances, fitted)
         self._task, self._rules = task, _rules(task)

@@ -185,7 +185,7 @@ def play_all(
     if engine == "compiled" and isinstance(policy, Policy):
         from mjcartpole.learning.compiled import CompiledLoop  # noqa: PLC0415 - it is heavy
 
-        return CompiledLoop(*world).play(policy, rng if given is None else given, count, chance)
+        return CompiledLoop(world).play(policy, rng if given is None else given, count, chance)
     log = EpisodeLog(count)
     with contextlib.closing(make_env(*world)) as env:
         lend(env, rng, chance)

@@ -193,7 +193,7 @@ class Training:
         if self.engine == "compiled":
             from mjcartpole.learning.compiled import CompiledLoop  # noqa: PLC0415 - it is heavy
 
-            self._loop = CompiledLoop(*self._world)
+            self._loop = CompiledLoop(self._world)
         else:
             self._env = make_env(*self._world)
 
@@ -233,7 +233,7 @@ class Training:
         fitted = self.learner.imagine(world, cartpole.control_step if cartpole else CONTROL_STEP)
         world.close()
         if self.engine == "compiled":
-            self._loop = type(self._loop)(*self._world, fitted=fitted)
+            self._loop = type(self._loop)(self._world, fitted)
         else:
             self._env = Dream(fitted, rules)
         self._seconds += time.perf_counter() - started
