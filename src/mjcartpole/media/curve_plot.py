@@ -89,11 +89,7 @@ class Curves:
 
     @plot_style()
     def figure(self) -> "Figure":
-        """Draw them.
-
-        Raises:
-            RenderError: matplotlib is not installed.
-        """
+        """Draw them (RenderError without matplotlib)."""
         from matplotlib.figure import Figure  # noqa: PLC0415 - an optional package
 
         figure = Figure(figsize=(8.6, 5 + 0.24 * len(self.lines)), layout="constrained")

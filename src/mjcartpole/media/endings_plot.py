@@ -59,11 +59,7 @@ class EndingsPlot:
 
     @plot_style()
     def figure(self) -> "Figure":
-        """Draw them.
-
-        Raises:
-            RenderError: matplotlib is not installed.
-        """
+        """Draw them (RenderError without matplotlib)."""
         from matplotlib.figure import Figure  # noqa: PLC0415 - an optional package
 
         n = len(self.runs)

@@ -108,11 +108,7 @@ class Grid:
 
     @plot_style()
     def figure(self) -> "Figure":
-        """Draw it.
-
-        Raises:
-            RenderError: matplotlib is not installed.
-        """
+        """Draw it (RenderError without matplotlib)."""
         from matplotlib.figure import Figure  # noqa: PLC0415 - an optional package
 
         height, width = len(self.fields), len(self.fields[0])
@@ -127,7 +123,7 @@ class Grid:
             _explain(figure, row, fields[0].kind, mesh)
         for ax, each in zip(axes[0], self.fields[0], strict=True):
             ax.set_title(short(each.title), fontsize="medium")
-        for path, number in zip(self.paths, range(len(self.paths)), strict=True):
+        for number, path in enumerate(self.paths):
             _draw_path(axes[0, 0], path, number)
         if width > 1:
             axes[0, 0].locator_params(axis="x", nbins=3)

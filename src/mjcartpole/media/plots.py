@@ -28,11 +28,7 @@ class Plot(Protocol):
     """Numbers that can be drawn."""
 
     def figure(self) -> "Figure":
-        """Draw them.
-
-        Raises:
-            RenderError: matplotlib is not installed.
-        """
+        """Draw them (RenderError without matplotlib)."""
 
     def rows(self) -> Iterator[Mapping[str, object]]:
         """Yield exactly what is drawn, as the lines of a table."""
@@ -70,8 +66,7 @@ def short(text: str, most: int = 40) -> str:
 def plot_style() -> Iterator[None]:
     """Have what is plotted inside look the same everywhere, whatever a user's own settings are.
 
-    Raises:
-        RenderError: matplotlib is not installed.
+    Without matplotlib it is a RenderError.
     """
     packages.check_installed("a plot", "matplotlib", RenderError)
     import matplotlib.style  # noqa: PLC0415 - an optional package

@@ -22,8 +22,7 @@ CELL = 0.96, 0.52
 def heat_map(result: TransferResult) -> "Figure":
     """Plot every policy (row) on every model (column): colour and number are the mean return.
 
-    Raises:
-        RenderError: matplotlib is not installed.
+    Without matplotlib it is a RenderError.
     """
     from matplotlib import colormaps  # noqa: PLC0415 - an optional package
     from matplotlib.figure import Figure  # noqa: PLC0415
@@ -57,10 +56,7 @@ def heat_map(result: TransferResult) -> "Figure":
 def curves(result: SweepResult) -> "Figure":
     """Plot the mean return of every policy against the parameter, with 95 % bands.
 
-    Where the simulation diverged there is a gap.
-
-    Raises:
-        RenderError: matplotlib is not installed.
+    Where the simulation diverged there is a gap. Without matplotlib it is a RenderError.
     """
     from matplotlib.figure import Figure  # noqa: PLC0415 - an optional package
 

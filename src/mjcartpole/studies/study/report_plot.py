@@ -101,11 +101,7 @@ class ReportPlot:
 
     @plot_style()
     def figure(self) -> "Figure":
-        """Draw it.
-
-        Raises:
-            RenderError: matplotlib is not installed.
-        """
+        """Draw it (RenderError without matplotlib)."""
         from matplotlib.figure import Figure  # noqa: PLC0415 - an optional package
 
         pair, factors = self.pair(), self.results.levels
