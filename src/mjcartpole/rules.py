@@ -60,6 +60,13 @@ def as_float(value: Any) -> float:  # noqa: ANN401 - to be checked
         return math.nan
 
 
+def whole_number(name: str, value: object, least: int, most: int) -> int:
+    """Return a whole number that lies between two, both included; refuse others (ConfigError)."""
+    if type(value) is not int or not least <= value <= most:
+        raise ConfigError(f"{name} must be a whole number from {least} to {most:,}, not {value!r}")
+    return value
+
+
 _STATE: Final = "m, m/s, rad, rad/s"
 _UNITS: Final = {
     "x_limit": "m",
@@ -77,11 +84,7 @@ def checked(name: str, value: Any) -> float | Reward:  # noqa: ANN401 - whatever
         ConfigError: It is none.
     """
     if name == "time_limit":
-        if type(value) is int and 1 <= value <= MOST_STEPS:
-            return value
-        raise ConfigError(
-            f"max_episode_steps must be a whole number from 1 to {MOST_STEPS:,}, not {value!r}"
-        )
+        return whole_number("max_episode_steps", value, 1, MOST_STEPS)
     if name == "reward":
         return _reward(value)
     return number_of(name, value, _UNITS[name], is_limit=name.endswith("limit"))

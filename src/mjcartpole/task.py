@@ -279,6 +279,11 @@ def state_names(poles: int = 1) -> tuple[str, ...]:
     return ("x", "x_dot", *names)
 
 
+def for_each_pole(values: tuple[Any, ...], poles: int) -> tuple[Any, ...]:
+    """Return four values, of the cart and one pole, as those of the cart and each pole."""
+    return values if len(values) != len(state_names()) else values[:2] + values[2:] * poles
+
+
 def in_words(poles: int) -> str:
     """Return a number of poles in words, for messages."""
     return "1 pole" if poles == 1 else f"{poles} poles"

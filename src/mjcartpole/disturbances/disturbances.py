@@ -18,8 +18,8 @@ from mjcartpole.disturbances.effects import QUEUE, Effects
 from mjcartpole.disturbances.ranges import NOTHING, Range, parse_ranges
 from mjcartpole.disturbances.shoves import LARGEST, Shove, parse_shove
 from mjcartpole.errors import ConfigError, check_known, nearest
-from mjcartpole.rules import MOST_STEPS, RULES, as_float
-from mjcartpole.task import Task, state_names
+from mjcartpole.rules import MOST_STEPS, RULES, as_float, whole_number
+from mjcartpole.task import Task, for_each_pole, state_names
 
 SMALLEST_STEP: Final = 1e-6
 """Of a converter: a state is then a whole number of steps that both engines know."""
@@ -94,7 +94,7 @@ class Disturbances(WorldDisturbances):
             self._put(name, _values(name, getattr(self, name)))
         for name, most in _COUNTS.items():
             if getattr(self, name) is not None:
-                _check_count(name, getattr(self, name), most)
+                whole_number(name, getattr(self, name), 0, most)
         for name, (unit, limit) in _SIZES.items():
             self._put(name, _size(name, getattr(self, name), unit, limit))
         self._put("observe_context", _truth("observe_context", self.observe_context))
@@ -254,11 +254,6 @@ def _several(values: object) -> tuple[Any, ...]:
     return tuple(values)
 
 
-def _check_count(name: str, value: object, most: int) -> None:
-    if type(value) is not int or not 0 <= value <= most:
-        raise ConfigError(f"{name} must be a whole number from 0 to {most:,}, not {value!r}")
-
-
 def _size(name: str, value: Any, unit: str, most: float) -> float:  # noqa: ANN401 - to be checked
     number = as_float(value)
     if not 0 <= number <= most:
@@ -300,7 +295,7 @@ def _for_each(values: tuple[float, ...], poles: int) -> list[float]:
     wanted = len(state_names(poles))
     if len(values) in (0, 1):
         return list(values or (0.0,)) * wanted
-    each = list(values[:2]) + list(values[2:]) * poles if len(values) == 4 else list(values)
+    each = list(for_each_pole(values, poles))
     if len(each) != wanted:
         raise ConfigError(
             f"{len(values)} numbers for what is seen, and a model whose states have {wanted}; "

@@ -22,7 +22,7 @@ from mjcartpole.learning.presets import PRESETS
 from mjcartpole.rewards import REWARDS, named
 from mjcartpole.rule_changes import RuleChanges
 from mjcartpole.rules import RULES
-from mjcartpole.task import CARTPOLE_V1, N_ACTIONS, Task, in_words, state_names
+from mjcartpole.task import CARTPOLE_V1, N_ACTIONS, Task, for_each_pole, in_words, state_names
 
 if TYPE_CHECKING:
     from mjcartpole.physics.cartpole import CartPole
@@ -216,7 +216,7 @@ class TrainConfig(RuleChanges):
                     f"{name} has {n} values, and the model has {in_words(poles)}; "
                     f"give {_DIMENSIONS}{also} ({', '.join(state_names(poles))})"
                 )
-        bins, low, high = (_for_each_pole(getattr(self, name), poles) for name in _GRID)
+        bins, low, high = (for_each_pole(getattr(self, name), poles) for name in _GRID)
         n, tilings = self.observe_actions, getattr(self, "tilings", 1)
         return Discretizer(
             # Before the first action neither was chosen; that counts as 1.
@@ -345,8 +345,3 @@ def config_class(method: str) -> type[TrainConfig]:
 
 def _from_values(values: Mapping[str, Any]) -> TrainConfig:
     return TrainConfig(**values)
-
-
-def _for_each_pole(values: tuple[Any, ...], poles: int) -> tuple[Any, ...]:
-    """Values of the cart and of one pole as values of the cart and of each pole."""
-    return values if len(values) != _DIMENSIONS else values[:2] + values[2:] * poles

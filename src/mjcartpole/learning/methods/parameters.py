@@ -7,6 +7,7 @@ from typing import Any, ClassVar, Literal, get_args, get_origin
 
 from mjcartpole.errors import ConfigError
 from mjcartpole.learning.discretizer import is_finite
+from mjcartpole.rules import whole_number
 from mjcartpole.task import Task
 
 
@@ -32,11 +33,7 @@ class Parameters:
                 raise ConfigError(f"{name} must be a number from 0 to 1, not {value!r}")
 
     def _check_whole(self, name: str, least: int, most: int = 2**31) -> None:
-        value = getattr(self, name)
-        if type(value) is not int or not least <= value <= most:
-            raise ConfigError(
-                f"{name} must be a whole number from {least} to {most:,}, not {value!r}"
-            )
+        whole_number(name, getattr(self, name), least, most)
 
     def _check_positive(self, name: str) -> None:
         value = getattr(self, name)

@@ -22,6 +22,7 @@ from typing import Any, Final, get_args
 from mjcartpole.disturbances.disturbances import Disturbances
 from mjcartpole.errors import ConfigError, FileError, check_known
 from mjcartpole.files import brief, read_bytes
+from mjcartpole.rules import whole_number
 from mjcartpole.studies.seeds import MAX_SEEDS
 from mjcartpole.studies.study.design import MOST_POINTS, Design, Factor, Range
 from mjcartpole.studies.study.measures import MEASURES, is_disturbed
@@ -253,9 +254,7 @@ def _design(name: str, value: Any) -> Any:  # noqa: ANN401
 
 def _count(name: str, value: Any) -> int:  # noqa: ANN401
     most = MOST_POINTS if name == "samples" else 2**63
-    if type(value) is not int or not 0 <= value <= most:
-        raise ConfigError(f"{name} must be a whole number from 0 to {most:,}, not {value!r}")
-    return value
+    return whole_number(name, value, 0, most)
 
 
 def _baseline(name: str, value: Any) -> dict[str, Any]:  # noqa: ANN401
