@@ -1,6 +1,7 @@
 """The command line as a person uses it: real processes where that matters."""
 
 import json
+import os
 import re
 import signal
 import subprocess
@@ -216,6 +217,13 @@ def test_a_reader_that_leaves_early_is_no_error(here):
     assert "Traceback" not in process.stderr.read()
     process.stderr.close()
     assert process.wait(timeout=60) == 0
+
+
+def test_help_ends_in_the_narrowest_terminal(monkeypatch, capsys):
+    monkeypatch.setenv("COLUMNS", "1")
+    code, out, err = call(["evaluate", "--help"], capsys)
+    assert (code, err, len(out.splitlines()[-1])) == (0, "", 40)
+    assert os.environ["COLUMNS"] == "1"
 
 
 def test_the_doctor_says_what_draws_and_what_encodes(here, capsys):

@@ -9,6 +9,7 @@ import contextlib
 import gc
 import logging
 import os
+import shutil
 import sys
 from collections.abc import Iterator, Sequence
 from typing import NoReturn
@@ -20,6 +21,8 @@ from mjcartpole.packages import check_installed
 from mjcartpole.signals import StopSignals
 
 INTERRUPTED = 130
+_FEWEST_COLUMNS = 40
+"""In which help is laid out; tyro would never end in a few."""
 
 
 def main(argv: Sequence[str] | None = None) -> NoReturn:
@@ -68,7 +71,9 @@ def _run(argv: list[str], is_own: bool) -> int:
     check_installed("the command line", "tyro")
     from mjcartpole.commands.parsing import parse  # noqa: PLC0415 - after the check
 
-    command = parse(argv or ["--help"])
+    columns = max(_FEWEST_COLUMNS, shutil.get_terminal_size().columns)
+    with _environment("COLUMNS", str(columns)):
+        command = parse(argv or ["--help"])
     _report_to_stderr()
     _import_mujoco(is_own)
     return command.run()
@@ -83,7 +88,8 @@ def _import_mujoco(is_own: bool) -> None:
         Interrupted: One came.
     """
     signals = StopSignals()
-    with signals.caught(), signals.deferred(), _no_window_system():
+    # For no window system: to look for one takes a while, and no command uses MuJoCo's renderer.
+    with signals.caught(), signals.deferred(), _environment("MUJOCO_GL", "disable"):
         from mjcartpole.commands import policies  # noqa: F401, PLC0415 - not for --help
         from mjcartpole.physics.library import stop_timers  # noqa: PLC0415
 
@@ -93,16 +99,16 @@ def _import_mujoco(is_own: bool) -> None:
 
 
 @contextlib.contextmanager
-def _no_window_system() -> Iterator[None]:
-    """Have MuJoCo look for none meanwhile: it takes a while, and no command uses its renderer."""
-    wanted = os.environ.get("MUJOCO_GL")
-    os.environ["MUJOCO_GL"] = "disable"
+def _environment(name: str, value: str) -> Iterator[None]:
+    """Have a variable of the environment be another one meanwhile."""
+    wanted = os.environ.get(name)
+    os.environ[name] = value
     try:
         yield
     finally:
-        del os.environ["MUJOCO_GL"]
+        del os.environ[name]
         if wanted is not None:
-            os.environ["MUJOCO_GL"] = wanted
+            os.environ[name] = wanted
 
 
 class _ToStderr(logging.Handler):
