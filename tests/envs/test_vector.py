@@ -82,8 +82,8 @@ def mask(*values):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"low": 1.0, "high": 0.0}, r"low \(1.0\) is above high"),
-        ({"low": "x"}, "low is a finite number, not 'x'"),
+        ({"low": 1.0, "high": 0.0}, r"Lower bound \(1.0\) must be lower"),
+        ({"low": "x"}, r"An option \(x\) could not be converted"),
         ({"edits": {"pole.length": 1}}, "no option 'edits'; available: low, high, reset_mask"),
         ({"reset_mask": [True, False]}, "array of 2 booleans"),
         ({"reset_mask": np.array([1, 0])}, "array of 2 booleans"),

@@ -2,7 +2,9 @@
 
 import math
 from collections.abc import Mapping
-from typing import Any, SupportsFloat
+from typing import Any
+
+from gymnasium.envs.classic_control.utils import maybe_parse_reset_bounds
 
 from mjcartpole.disturbances.disturbances import Disturbances
 from mjcartpole.errors import ConfigError
@@ -76,20 +78,11 @@ def start_bounds(
                 "model or the rules is given where the environment is made; a state is set after "
                 "the reset, by env.unwrapped.state = (…)"
             )
-    low, high = (
-        _finite(each, options.get(each, usual[place])) for place, each in enumerate(known[:2])
-    )
-    if low > high:
-        raise ConfigError(f"low ({low}) is above high ({high}); the starting state lies between")
-    _finite("the distance from low to high", high - low)
-    return low, high + 0.0
-
-
-def _finite(name: str, value: SupportsFloat | str) -> float:
     try:
-        number = float(value)
-    except (TypeError, ValueError, OverflowError):
-        number = math.nan
-    if not math.isfinite(number):
-        raise ConfigError(f"{name} is a finite number, not {value!r}")
-    return number
+        # In gymnasium's own words, which CartPole-v1's users know.
+        low, high = maybe_parse_reset_bounds(dict(options), *usual)
+    except (ValueError, OverflowError) as error:
+        raise ConfigError(str(error)) from error
+    if not math.isfinite(high - low):
+        raise ConfigError(f"reset starts between two finite bounds, not low={low}, high={high}")
+    return low, high + 0.0
