@@ -177,7 +177,8 @@ class Discretizer:
                     f"not {low!r} to {high!r}"
                 )
             if not 0 < (high - low) / n < math.inf:
-                raise ConfigError(f"the range {low!r} to {high!r} cannot be cut into {n} bins")
+                bins = f"{n} bin{'s' if n > 1 else ''}"
+                raise ConfigError(f"the range {low!r} to {high!r} cannot be cut into {bins}")
             if self.mirror and n > 1 and low != -high:
                 raise ConfigError(
                     "mirror needs ranges that are as long to the left as to the right; "
@@ -190,6 +191,11 @@ class Discretizer:
             raise ConfigError(f"tilings must be one of {known}, not {self.tilings!r}")
         if self.tilings > 1 and self.interpolated:
             raise ConfigError("tilings are for bins, not for nodes between which is interpolated")
+        if self.tilings > 1 and max(self.bins) == 1:
+            raise ConfigError(
+                "tilings differ where a bin ends and the next one begins, and bins "
+                f"{self.bins} end nowhere; give more bins, or 1 for the tilings"
+            )
         rows = self.tilings * math.prod(self.bins)
         if rows > MAX_STATES:
             times = f" in {self.tilings} tilings" if self.tilings > 1 else ""
