@@ -43,6 +43,8 @@ class Parameters(q_learning.Parameters):
     # episodes that are greedy show a cart that rolls away where exploring steps would stop it.
     gamma: float = 0.99
     """Discount per step."""
+    alpha_final: float = 0.01
+    """Step size once decayed."""
     epsilon_final: float = 0.0
     """Probability of a random action once decayed."""
     fit: Fit = "rod"

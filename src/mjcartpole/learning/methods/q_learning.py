@@ -37,6 +37,8 @@ __all__ = ["act", "begin_episode", "greedy_values", "make_memory"]
 class Parameters(TiledParameters):
     """Those of action values, and lambda."""
 
+    alpha_final: float = 0.003
+    """Step size once decayed."""
     td_lambda: float | None = 0.9
     """Learn after each episode from lambda-returns with this lambda; None: after each step."""
 
