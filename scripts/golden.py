@@ -22,6 +22,7 @@ from mjcartpole.learning.documents import read_values
 FILE: Final = Path(__file__).resolve().parents[1] / "docs" / "golden.json"
 STEPS: Final = 10_000
 PRESET: Final = "tuned"
+NEXT: Final = "next"
 
 Entry = dict[str, Any]
 """`config` of a training, or the `integrator` of steps; and `sha256` by version of MuJoCo."""
@@ -87,8 +88,19 @@ def compare(releases: dict[str, dict[str, Entry]]) -> bool:
     return not any(one.startswith("MOVED") for one in verdicts)
 
 
+def settings(entries: dict[str, Entry]) -> Any:
+    """Return what entries are of, as JSON has it, without what came out."""
+    kept = {name: {**entry, "sha256": None} for name, entry in entries.items()}
+    return json.loads(json.dumps(kept))
+
+
 def write(release: str, releases: dict[str, dict[str, Entry]], file: Path = FILE) -> None:
-    """Do what a release holds, and keep it in the file beside what other MuJoCos gave."""
+    """Do what a release holds, and keep it in the file beside what other MuJoCos gave.
+
+    What holds for the next release is what is so today, where that has changed.
+    """
+    if release == NEXT and settings(releases.get(NEXT, {})) != settings(today()):
+        releases[NEXT] = today()
     entries = releases.setdefault(release, today())
     for entry in entries.values():
         entry["sha256"][mujoco.__version__] = digest(entry)

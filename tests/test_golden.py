@@ -26,10 +26,7 @@ def test_bits_are_those_of_a_release(release, name):
 
 def test_what_is_held_of_today_is_what_today_gives():
     """A preset that changes has its new numbers written down."""
-    today = json.loads(json.dumps(GOLDEN["today"]()))
-    held = copy.deepcopy(RELEASES["next"])
-    for entry in (*today.values(), *held.values()):
-        del entry["sha256"]
+    held, today = map(GOLDEN["settings"], (RELEASES["next"], GOLDEN["today"]()))
     assert held == today, "run with each MuJoCo: python scripts/golden.py --write next"
 
 
@@ -44,6 +41,17 @@ def test_what_is_held_of_today_is_what_today_gives():
 )
 def test_what_moved_is_told(sha256, found, words):
     assert GOLDEN["verdict"]({"sha256": sha256}, found) == words
+
+
+@pytest.mark.slow
+def test_the_next_release_is_written_anew_where_settings_changed(tmp_path):
+    file, releases = tmp_path / "golden.json", copy.deepcopy(RELEASES)
+    releases["next"]["tuned on gym"]["config"]["alpha"] = 0.7
+    releases["0.1.0"]["tuned on gym"]["config"]["alpha"] = 0.7
+    GOLDEN["write"]("next", releases, file)
+    written = json.loads(file.read_text(encoding="utf-8"))
+    assert GOLDEN["settings"](written["next"]) == GOLDEN["settings"](RELEASES["next"])
+    assert written["0.1.0"] == releases["0.1.0"]
 
 
 @pytest.mark.slow
