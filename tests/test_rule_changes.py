@@ -50,7 +50,7 @@ def test_nothing_changed_is_the_task_itself():
 
 @pytest.mark.parametrize("backend", few(["mujoco", "gym"], "gym", long=("mujoco",)))
 def test_both_engines_learn_and_play_by_them_alike(backend):
-    config = TrainConfig(backend=backend, episodes=25, **CHANGES)
+    config = TrainConfig(backend=backend, episodes=60, **CHANGES)
     assert config.rules == RULES
     compiled, plain = (train(config, engine=engine) for engine in ("compiled", "python"))
     np.testing.assert_array_equal(compiled.q_table, plain.q_table)

@@ -9,7 +9,7 @@ from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.training import train
 from nightly import few
 
-FORMER = {"episodes": 1_500, "decay": 0.5, "mirror": False}
+FORMER = {"episodes": 1_500, "alpha_final": 0.01, "decay": 0.5, "mirror": False}
 """What `tuned` was in 0.1.0."""
 
 FORMER_TWO_POLES = {"bins": (3, 1, 8, 8, 8, 8), "alpha": 0.1, "tilings": 1, "mirror": False}

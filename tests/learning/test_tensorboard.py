@@ -34,7 +34,7 @@ def test_each_episode_is_a_point(tmp_path):
     for points in curves.values():
         assert [step for step, _ in points] == list(range(1, 31))
     assert [value for _, value in curves["train/return"]] == result.returns.tolist()
-    for name, start, end in (("alpha", 0.1, 0.01), ("epsilon", 1.0, 0.01)):
+    for name, start, end in (("alpha", 0.1, 0.003), ("epsilon", 1.0, 0.01)):
         values = [value for _, value in curves[f"train/{name}"]]
         assert values[0] == pytest.approx(start)
         assert values[-1] == pytest.approx(end)
