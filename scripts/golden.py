@@ -88,10 +88,10 @@ def compare(releases: dict[str, dict[str, Entry]]) -> bool:
     return not any(one.startswith("MOVED") for one in verdicts)
 
 
-def settings(entries: dict[str, Entry]) -> Any:
+def settings(entries: dict[str, Entry]) -> str:
     """Return what entries are of, as JSON has it, without what came out."""
     kept = {name: {**entry, "sha256": None} for name, entry in entries.items()}
-    return json.loads(json.dumps(kept))
+    return json.dumps(kept, sort_keys=True)
 
 
 def write(release: str, releases: dict[str, dict[str, Entry]], file: Path = FILE) -> None:
