@@ -68,9 +68,10 @@ class Parameters(q_learning.Parameters):
                 "take another method"
             )
         if self.fit == "linear" and task.theta_limit > np.pi / 4:
+            limit = f"{task.theta_limit:.3g} rad" if np.isfinite(task.theta_limit) else "any angle"
             raise ConfigError(
                 f"a linear model holds near upright only, and {task.name} lets the pole lean by "
-                f"{task.theta_limit:.3g} rad; take fit 'rod'"
+                f"{limit}; take fit 'rod'"
             )
 
 
