@@ -104,6 +104,7 @@ def test_nothing_is_replaced_unless_it_is_asked_for(here, capsys):
         (["table", "one", "--window", "3"], "--window is for plot curve, not for plot table"),
         (["curve", "one", "--dims", "x"], "--dims is for plot table and basin and phase"),
         (["curve", "one", "--window", "0"], "window must be a whole number of episodes"),
+        (["curve", "one", "--average", "iqm"], "iqm is an average over seeds, and each run here"),
         (["curve", "one", "-o", "a.bmp"], "its suffix says what is written: .png, .svg, .pdf"),
         (["curve", "one", "--data", "a.txt"], "the data of a plot is a .csv, not 'a.txt'"),
         (["table", "one", "many"], "plot table is for one run, not 2"),

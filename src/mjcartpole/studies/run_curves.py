@@ -64,16 +64,22 @@ def _records(folder: Path) -> Iterator[Record]:
 
 
 def curves_of(
-    groups: Sequence[Group], *, window: int | None = None, average: Average = "mean"
+    groups: Sequence[Group], *, window: int | None = None, average: Average | None = None
 ) -> Curves:
     """Return the learning curves of runs by name; several under one name are seeds of one config.
 
     The window is the episodes of the running mean, a fortieth of the longest run if left out; many
-    seeds are drawn as an average, beside its 95 % bootstrap interval.
+    seeds are drawn as an average, the mean if left out, beside its 95 % bootstrap interval.
 
     Raises:
-        ConfigError: The window is no whole number from 1 up.
+        ConfigError: The window is no whole number from 1 up, or there is nothing to average.
     """
+    if average and all(len(records) == 1 for _, records in groups):
+        raise ConfigError(
+            f"{average} is an average over seeds, and each run here is a line of one; "
+            "leave it out, or give runs that differ by their seed alone"
+        )
+    average = average or "mean"
     longest = max(len(each.columns.totals) for _, records in groups for each in records)
     window = usual_window(longest) if window is None else window
     if window < 1:

@@ -74,7 +74,7 @@ def numbers(kind: Kinds, runs: Sequence[Path], **options: Any) -> Plot:  # noqa:
 
 
 def curve(
-    folders: Iterable[Path], *, window: int | None = None, average: Average = "mean"
+    folders: Iterable[Path], *, window: int | None = None, average: Average | None = None
 ) -> Curves:
     """Return learning curves; runs that differ by their seed alone are one line with a band.
 
@@ -82,7 +82,7 @@ def curve(
 
     Raises:
         RunError: A run is damaged, or no episode of it is finished.
-        ConfigError: The window makes no sense.
+        ConfigError: The window or the average makes no sense.
     """
     return curves_of(read_groups(folders), window=window, average=average)
 

@@ -123,6 +123,13 @@ def test_the_base_line_is_the_one_that_is_named(results):
         results.baseline(["alpha=0.1", "alpha=0.3"])
 
 
+def test_a_base_line_without_a_run_yet_is_no_unknown_level(tmp_path):
+    begun = write(tmp_path / "begun", [row for row in rows() if row["alpha"] == "0.3"])
+    said = "no run with alpha=0.1, the base line, is done yet, or all failed; .* alpha=0.3"
+    with pytest.raises(ConfigError, match=said):
+        read_results(begun).baseline(["alpha=0.1"])
+
+
 def test_a_run_that_was_never_solved_counts_as_all_that_it_spent(said):
     low, high = table(said, "episodes_to_solve", "alpha")
     assert (low["worst"], high["worst"]) == ("100", "13")

@@ -91,8 +91,15 @@ class Results:
                 raise ConfigError(f"--baseline has two levels of {name}; give one")
             asked[name] = level
         found |= asked
-        for each in self.levels:
-            check_known(f"{each.name}: level", found[each.name], each.names)
+        for factor, each in zip(self.study.factors, self.levels, strict=True):
+            level = found[each.name]
+            if level not in each.names and level in map(as_text, factor.on_grid()):
+                raise ConfigError(
+                    f"no run with {each.name}={level}, the base line, is done yet, or all failed; "
+                    f"go on with the study: {_AGAIN}, or give --baseline "
+                    f"{each.name}={each.names[0]}"
+                )
+            check_known(f"{each.name}: level", level, each.names)
         return found
 
 
