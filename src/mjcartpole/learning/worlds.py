@@ -10,6 +10,7 @@ from mjcartpole.disturbances.contexts import Chance
 from mjcartpole.disturbances.disturbances import Disturbances
 from mjcartpole.learning.fitted import Fitted
 from mjcartpole.learning.kinds import Disturbed, GymPhysics, MujocoPhysics, Physics
+from mjcartpole.physics.bare import bare
 from mjcartpole.physics.bodies import starting_state
 from mjcartpole.physics.cartpole import CartPole, own_copy
 from mjcartpole.physics.cartpole_v1 import FORCE
@@ -47,7 +48,7 @@ class Worlds:
         self.size = len(state_names(cartpole.poles if cartpole else 1))
         self._most = max(1, disturbances.pool or 0)
         self._made: dict[int, tuple[CartPole | None, _World]] = {}
-        self._first = self._make(cartpole)
+        self._first = self._make(bare(cartpole) if cartpole and not self.vary else cartpole)
 
     def physics(self, chance: Chance | None, number: int) -> Physics:
         """Return that of an episode; where there are disturbances, `chance` draws them."""

@@ -24,7 +24,7 @@ from mjcartpole.physics.structure import (
     refusal,
 )
 
-_NAMES_FILE: Final = re.compile(r"file\w*\s*=")
+NAMES_FILE: Final = re.compile(r"file\w*\s*=")
 """In the text of a document that depends on other files: includes, meshes, attached models."""
 
 
@@ -38,7 +38,7 @@ def build(source: str | Document, name: str, path: Path | None = None) -> CartPo
         ModelError: It does not load, or is no cart-pole.
     """
     text = source if isinstance(source, str) else source.text
-    names_files = _NAMES_FILE.search(text)
+    names_files = NAMES_FILE.search(text)
 
     def make() -> CartPole:
         if isinstance(source, Document) and not names_files:

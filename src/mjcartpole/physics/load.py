@@ -224,23 +224,31 @@ def _from_spec(spec: mujoco.MjSpec) -> tuple[str, str, mujoco.MjModel]:
     return spec.modelname or "the MjSpec", xml, model
 
 
-def same_model(a: mujoco.MjModel, b: mujoco.MjModel) -> bool:
+def same_model(a: mujoco.MjModel, b: mujoco.MjModel, but: tuple[str, ...] = ()) -> bool:
     """Return whether two compiled models are equal in every number, name and option.
 
-    Where their files lie makes no difference.
+    Where their files lie makes no difference, nor do values whose names begin with one of `but`.
     """
-    saved = [np.empty(mujoco.mj_sizeModel(model), np.uint8) for model in (a, b)]
-    for model, buffer in zip((a, b), saved, strict=True):
-        mujoco.mj_saveModel(model, None, buffer)
-    return np.array_equal(saved[0], saved[1]) or dict(_values_of(a)) == dict(_values_of(b))
+    return saved(a) == saved(b) or dict(_values_of(a, but)) == dict(_values_of(b, but))
+
+
+def saved(model: mujoco.MjModel) -> bytes:
+    """Return a compiled model as bytes."""
+    buffer = np.empty(mujoco.mj_sizeModel(model), np.uint8)
+    mujoco.mj_saveModel(model, None, buffer)
+    return buffer.tobytes()
 
 
 _NO_VALUES: Final = {"nbuffer", "signature"}
 """Of a compiled model: they go with the length of paths, and are lost in a pickle."""
 
 
-def _values_of(part: object, prefix: str = "") -> Iterator[tuple[str, object]]:
+def _values_of(
+    part: object, but: tuple[str, ...], prefix: str = ""
+) -> Iterator[tuple[str, object]]:
     for name in dir(part):
+        if (prefix + name).startswith(but):
+            continue
         value = getattr(part, name)
         if name.startswith("_") or callable(value) or "path" in name or name in _NO_VALUES:
             continue
@@ -249,4 +257,4 @@ def _values_of(part: object, prefix: str = "") -> Iterator[tuple[str, object]]:
         elif isinstance(value, int | float | bytes):
             yield prefix + name, value
         else:
-            yield from _values_of(value, f"{prefix}{name}.")
+            yield from _values_of(value, but, f"{prefix}{name}.")
