@@ -9,6 +9,7 @@ import importlib.util
 import json
 import os
 import pickle
+import platform
 import shutil
 import signal
 import socket
@@ -79,6 +80,20 @@ def test_a_worker_of_another_version_is_refused():
     with pytest.raises(ConfigError, match=r"this worker has mujoco .*, and here it is 0\.9"):
         run_parcel(other)
     assert len(versions_here()["mjcartpole's sources"]) == 8
+
+
+FMA = Path("/proc/cpuinfo").exists() and b" fma " in Path("/proc/cpuinfo").read_bytes()
+SHOW = f"import json; from {cluster.__name__} import *; print(json.dumps(versions_here()))"
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not (FMA and platform.libc_ver()[0] == "glibc"), reason="glibc may go without")
+def test_a_worker_whose_sines_are_rounded_otherwise_is_refused():
+    """As of a processor of before 2013: two trainings of 2,400 come to something else there."""
+    without = os.environ | {"GLIBC_TUNABLES": "glibc.cpu.hwcaps=-FMA,-AVX2"}
+    told = subprocess.check_output([sys.executable, "-c", SHOW], env=without, text=True)
+    with pytest.raises(ConfigError, match=r"C library whose sines come to \w+, .* of its kind"):
+        cluster.check_versions(json.loads(told), versions_here(), "a worker")
 
 
 @pytest.mark.skipif(HAS_DASK, reason="distributed is installed")

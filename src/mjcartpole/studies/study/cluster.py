@@ -10,7 +10,9 @@ import dataclasses
 import functools
 import hashlib
 import logging
+import math
 import re
+import struct
 import tempfile
 import threading
 import time
@@ -43,6 +45,7 @@ _MOST_FILE: Final = 2**28
 _FOLDERS: Final = ("disturbances", "physics", "envs", "learning")
 _DECIDING: Final = ("*.py", *(f"{name}/**/*.py" for name in _FOLDERS))
 """What of this package decides the bits of a training."""
+_SINES: Final = "a C library whose sines come to"
 
 _ADDRESS: Final = re.compile(r"((tcp|tls|ucx|ws|wss)://)?[^\s/]+:\d{1,5}")
 _START: Final = (
@@ -109,16 +112,23 @@ def versions_here() -> dict[str, str]:
     digest = hashlib.sha256()
     for path in paths:
         digest.update(path.read_text(encoding="utf-8").encode())
-    return {**versions(), "mjcartpole's sources": digest.hexdigest()[:8]}
+    return {**versions(), "mjcartpole's sources": digest.hexdigest()[:8], _SINES: _sines()}
+
+
+def _sines() -> str:
+    """Return a digest of sines and cosines: a C library rounds them as its processor can."""
+    values = [turn(k / 512) for turn in (math.sin, math.cos) for k in range(2048)]
+    return hashlib.sha256(struct.pack(f"<{len(values)}d", *values)).hexdigest()[:8]
 
 
 def check_versions(there: Mapping[str, str], here: Mapping[str, str], where: str) -> None:
     """Refuse a worker that would find other figures (ConfigError)."""
     for name in here:
         if there.get(name) != here[name]:
+            step = "begin on a machine of its kind" if name == _SINES else "install the same there"
             raise ConfigError(
                 f"{where} has {name} {there.get(name, 'of another kind')}, and here it is "
-                f"{here[name]}; install the same there"
+                f"{here[name]}; {step}"
             )
 
 
