@@ -17,6 +17,7 @@ from nightly import few
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = Path(mjcartpole.__file__).parent
 LAYERS = [
+    "garbage",
     "errors",
     "packages",
     "cores",

@@ -14,8 +14,11 @@ libraries are imported when they are first needed.
 import importlib
 from typing import TYPE_CHECKING
 
-from mjcartpole.envs.registration import ENV_ID, register, register_task
-from mjcartpole.task import Task
+from mjcartpole.garbage import kept
+
+with kept():
+    from mjcartpole.envs.registration import ENV_ID, register, register_task
+    from mjcartpole.task import Task
 
 if TYPE_CHECKING:
     from mjcartpole.disturbances.disturbances import Disturbances

@@ -4,7 +4,6 @@ Results go to stdout, progress and errors to stderr. Exit codes: 0, 2 for a user
 results that could not be printed, 130 after Ctrl-C.
 """
 
-import atexit
 import contextlib
 import gc
 import logging
@@ -16,6 +15,7 @@ from typing import NoReturn
 
 from mjcartpole import __version__
 from mjcartpole.errors import MjCartPoleError
+from mjcartpole.garbage import collect_rarely
 from mjcartpole.output import ERASE, FAILED, has_left, patient_output, stdout_problem
 from mjcartpole.packages import check_installed
 from mjcartpole.signals import StopSignals
@@ -29,7 +29,7 @@ def main(argv: Sequence[str] | None = None) -> NoReturn:
     """Run a command and exit with its code."""
     is_own = argv is None  # The process is this command's own.
     if is_own:
-        _collect_rarely()
+        collect_rarely()
     with patient_output():
         code = _exit_code(list(sys.argv[1:] if argv is None else argv), is_own)
         problem = stdout_problem()
@@ -38,12 +38,6 @@ def main(argv: Sequence[str] | None = None) -> NoReturn:
             _complain(f"error: stdout could not be written ({reason}); all else went on without it")
             code = code or FAILED
     sys.exit(code)
-
-
-def _collect_rarely() -> None:
-    """Have Python look for garbage seldom, and not at exit: what a start makes is there to stay."""
-    gc.set_threshold(100_000)
-    atexit.register(gc.freeze)
 
 
 def _exit_code(argv: list[str], is_own: bool) -> int:
@@ -95,6 +89,7 @@ def _import_mujoco(is_own: bool) -> None:
 
         if is_own:
             stop_timers()
+            gc.freeze()  # What was imported is there to stay.
     signals.raise_noted()
 
 
