@@ -101,9 +101,9 @@ PICTURES = {
 
 PLAIN = {
     "models/                 MJCF files, hand-written and commented; they ship inside the wheel",
-    "errors ← packages ← cores ← rewards ← rules ← task ← rule_changes ← disturbances ← integrator"
-    " ← leftovers ← files ← versions ← physics ← media ← envs ← learning ← studies ← page"
-    " ← commands ← cli",
+    "garbage ← errors ← packages ← cores ← rewards ← rules ← task ← rule_changes ← disturbances"
+    " ← integrator ← leftovers ← files ← versions ← physics ← media ← envs ← learning ← studies"
+    " ← page ← commands ← cli",
     "Q(s, a) ← Q(s, a) + α (G − Q(s, a))",  # noqa: RUF001 - a formula
     "[study]",
     "dask scheduler",

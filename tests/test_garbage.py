@@ -22,16 +22,13 @@ class Cycle:
 
 def test_nothing_is_looked_through_meanwhile_and_garbage_is_found_later():
     gc.collect()
-    before = gc.get_stats()[0]["collections"]
     with kept():
+        before = gc.get_stats()[0]["collections"]
         others = [[] for _ in range(10 * gc.get_threshold()[0])]
         Cycle()
-    assert gc.get_stats()[0]["collections"] == before
-    assert (gc.isenabled(), gc.get_freeze_count(), gc.get_count()[0] < len(others)) == (
-        True,
-        0,
-        True,
-    )
+        assert gc.get_stats()[0]["collections"] == before
+    assert gc.isenabled()
+    assert gc.get_count()[0] < len(others)
     assert Cycle.alive == 1
     gc.collect()
     assert Cycle.alive == 0
@@ -44,7 +41,7 @@ def test_a_collector_that_was_off_stays_off_and_what_was_frozen_stays_frozen():
         with kept():
             pass
         assert not gc.isenabled()
-        assert gc.get_freeze_count() > 0
+        assert gc.get_freeze_count() > 1_000
     finally:
         gc.unfreeze()
         gc.enable()
