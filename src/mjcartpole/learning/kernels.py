@@ -349,14 +349,16 @@ def _sources(reward: Any, *functions: Any) -> str:
     value that an entry closes over is part of the cache's key.
     """
     constants = _globals_of(reward)
-    # Functions and objects that a reward takes from elsewhere change without its own text.
-    if reward.__closure__ or not all(type(each) in _PLAIN for each in constants):
+    # Functions and objects that a reward takes from elsewhere change without its own text; and what
+    # was typed at a prompt has no file, but Python may show another text for it.
+    elsewhere = reward.__closure__ or not all(type(each) in _PLAIN for each in constants)
+    if elsewhere or reward.__code__.co_filename.startswith("<"):
         return ""
     files = {inspect.getmodule(each) for each in _reached(*functions)}
     try:
         texts = [inspect.getsource(each) for each in (*_SHARED, *sorted(files, key=repr), reward)]
     except (OSError, TypeError):
-        return ""  # It was typed at a prompt.
+        return ""
     return hashlib.sha256("".join([*texts, repr((LARGEST_SANE, constants))]).encode()).hexdigest()
 
 
