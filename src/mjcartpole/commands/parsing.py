@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import tyro
 
 from mjcartpole.commands.options import Command, UsageError
-from mjcartpole.commands.registry import COMMANDS, grammar, name_of
+from mjcartpole.commands.plain import plain
 from mjcartpole.commands.words import LISTS, rewritten
 from mjcartpole.errors import check_known, nearest
 
@@ -22,6 +22,12 @@ def parse(argv: Sequence[str]) -> Command:
         SystemExit: With code 0, after `--help`.
     """
     words = rewritten(argv)
+    return plain(words) or _by_tyro(words)
+
+
+def _by_tyro(words: list[str]) -> Command:
+    from mjcartpole.commands.registry import grammar
+
     complaint = io.StringIO()
     try:
         with contextlib.redirect_stderr(complaint), LISTS:
@@ -45,6 +51,8 @@ def _explained(words: list[str], complaint: str) -> str:
     Raises:
         UsageError: It names no command that there is.
     """
+    from mjcartpole.commands.registry import COMMANDS, name_of
+
     named = {name_of(command): command for command in COMMANDS}
     if not words[0].startswith("-"):
         check_known("command", words[0], named, UsageError)
