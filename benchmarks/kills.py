@@ -89,7 +89,7 @@ class Study:
             while len(self.log) < due:
                 if process.poll() is not None:
                     raise SystemExit(f"{self.name} has ended by itself")
-                time.sleep(0.05)
+                time.sleep(0.1)
             event()
             print(f"{self.name}: a SIGKILL after {len(self.log):,} runs", flush=True)
         process.communicate()
@@ -146,10 +146,10 @@ def kill_one(parent: int) -> None:
 
 def workers_of(parent: int) -> list[int]:
     """Return the process numbers of its workers, but for its other children."""
-    children = Path(f"/proc/{parent}/task/{parent}/children").read_text(encoding="utf-8")
     return [
         int(child)
-        for child in children.split()
+        for thread in Path(f"/proc/{parent}/task").iterdir()
+        for child in (thread / "children").read_text(encoding="utf-8").split()
         if b"spawn_main" in Path(f"/proc/{child}/cmdline").read_bytes()
     ]
 
