@@ -14,6 +14,8 @@ NOT_HERE = {
     "pip install mujoco gymnasium numpy": "it loads packages from an index",
     "pip install --no-deps mjcartpole": "it loads packages from an index",
     "pip install 'mjcartpole[deep]'": "it loads packages from an index",
+    "pip install --editable .": "it loads packages from an index",
+    "make constraints": "it loads packages from an index",
     "python benchmarks/deep.py": "it needs PyTorch, and hours",
     "mjcartpole study docs/study.toml --scheduler tcp://127.0.0.1:8786": "it needs a scheduler",
 }
