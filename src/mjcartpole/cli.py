@@ -74,7 +74,7 @@ def _run(argv: list[str], is_own: bool) -> int:
 
 
 def _import_mujoco(is_own: bool) -> None:
-    """Import what each command needs; MuJoCo's modules lose an interrupt that comes meanwhile.
+    """Import MuJoCo for the command; its modules lose an interrupt that comes meanwhile.
 
     In a process of the command's own MuJoCo has nobody to measure its steps for.
 
@@ -84,8 +84,7 @@ def _import_mujoco(is_own: bool) -> None:
     signals = StopSignals()
     # For no window system: to look for one takes a while, and no command uses MuJoCo's renderer.
     with signals.caught(), signals.deferred(), _environment("MUJOCO_GL", "disable"):
-        from mjcartpole.commands import policies  # noqa: F401, PLC0415 - not for --help
-        from mjcartpole.physics.library import stop_timers  # noqa: PLC0415
+        from mjcartpole.physics.library import stop_timers  # noqa: PLC0415 - not for --help
 
         if is_own:
             stop_timers()

@@ -3,13 +3,15 @@
 import sys
 import time
 from collections.abc import Iterable
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from mjcartpole.commands.bar import Bar
 from mjcartpole.learning.compiling import compiling
 from mjcartpole.learning.session import Session
 from mjcartpole.signals import StopSignals
-from mjcartpole.studies.multi_seed import SeedRunner
+
+if TYPE_CHECKING:
+    from mjcartpole.studies.multi_seed import SeedRunner
 
 RUNNING_MEAN = 100
 """Episodes in the progress bar's mean."""
@@ -40,7 +42,7 @@ def train_session(session: Session, signals: StopSignals) -> None:
         print(speed, file=sys.stderr, flush=True)
 
 
-def train_seeds(runner: SeedRunner, signals: StopSignals) -> None:
+def train_seeds(runner: "SeedRunner", signals: StopSignals) -> None:
     """Train all seeds to the end or to a signal."""
     with Bar(doing, len(runner.seeds), "seeds") as bar:
         for found in runner.run(signals.stop):

@@ -44,21 +44,27 @@ class Train(Command):
 
     def run(self) -> int:
         """Train one seed, many of them, or go on with either."""
-        from mjcartpole.commands import train_one, train_seeds
+        from mjcartpole.commands import train_one
         from mjcartpole.learning.folders import SEEDS
         from mjcartpole.learning.runs import content_of
 
         if self.how.allow_assets and self.resume is None:
             raise ConfigError("--allow-assets is for --resume; a new run's model may name any file")
-        if self.resume is not None and SEEDS in content_of(self.resume):
-            return train_seeds.resume(self.resume, self.how)
-        if self.seeds != 1:
-            return train_seeds.train(self.config, self.how, self.where, self.seeds)
+        are_many = self.resume is not None and SEEDS in content_of(self.resume)
+        if are_many or self.seeds != 1:
+            return self._train_seeds()
         if self.how.workers is not None:
             raise ConfigError("--workers is for several --seeds")
         if self.resume is not None:
             return train_one.resume(self.resume, self.how)
         return train_one.train(self.config, self.how, self.where)
+
+    def _train_seeds(self) -> int:
+        from mjcartpole.commands import train_seeds
+
+        if self.resume is not None:
+            return train_seeds.resume(self.resume, self.how)
+        return train_seeds.train(self.config, self.how, self.where, self.seeds)
 
 
 _DECISIVE: Final = [
