@@ -78,7 +78,7 @@ PRINTED = {
 
 PICTURES = {
     "mjcartpole plot curve runs/tuned-mujoco-seed0 runs/tuned-gym-seeds0-4": {
-        "docs/images/plot_curve.png": "plots/tuned-mujoco-seed0-and-1-others-curve.png",
+        "docs/images/plot_curve.png": "plots/tuned-mujoco-seed0-and-1-other-curve.png",
     },
     "mjcartpole plot table runs/tuned-mujoco-seed0": {
         "docs/images/plot_table.png": "plots/tuned-mujoco-seed0-table.png",

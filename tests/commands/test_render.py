@@ -59,8 +59,8 @@ def mp4(path):
         stream = container.streams.video[0]
         assert (stream.codec.name, stream.pix_fmt) == ("h264", "yuv420p")
         pictures = [frame.to_ndarray(format="rgb24") for frame in container.decode(stream)]
-        seconds = container.duration / av.time_base
-    frames, fps = np.array(pictures), int(stream.average_rate)
+        seconds, fps = container.duration / av.time_base, float(stream.average_rate)
+    frames = np.array(pictures)
     assert seconds == pytest.approx(len(frames) / fps, abs=0.011)
     return frames, fps
 

@@ -14,11 +14,13 @@ AVCOL_RANGE_MPEG = AVCOL_SPC_BT709 = AVCOL_PRI_BT709 = AVCOL_TRC_BT709 = 1
 
 
 def read(path):
-    """A video's stream, and its frames, shape (n, height, width, 3)."""
+    """What a video's stream says of itself, and its frames, shape (n, height, width, 3)."""
     with av.open(str(path)) as container:
         stream = container.streams.video[0]
+        colours = stream.color_range, stream.colorspace, stream.color_primaries, stream.color_trc
+        said = stream.codec.name, stream.pix_fmt, stream.average_rate, colours
         pictures = [frame.to_ndarray(format="rgb24") for frame in container.decode(stream)]
-    return stream, np.array(pictures)
+    return said, np.array(pictures)
 
 
 def count_and_seconds(path):
@@ -31,10 +33,9 @@ def count_and_seconds(path):
 def test_a_video_is_h264_with_the_right_size_rate_and_length(tmp_path):
     path = tmp_path / "run.mp4"
     assert write_video(path, frames(25, 66, 50)) == Video(path, 25, 66, 50, 50)
-    stream, pictures = read(path)
-    assert (stream.codec.name, stream.pix_fmt, stream.average_rate) == ("h264", "yuv420p", 50)
-    assert (stream.color_range, stream.colorspace) == (AVCOL_RANGE_MPEG, AVCOL_SPC_BT709)
-    assert (stream.color_primaries, stream.color_trc) == (AVCOL_PRI_BT709, AVCOL_TRC_BT709)
+    said, pictures = read(path)
+    bt709 = AVCOL_RANGE_MPEG, AVCOL_SPC_BT709, AVCOL_PRI_BT709, AVCOL_TRC_BT709
+    assert said == ("h264", "yuv420p", 50, bt709)
     assert count_and_seconds(path) == (25, 0.5)
     assert pictures.shape == (25, 50, 66, 3)
     assert list(tmp_path.iterdir()) == [path]
