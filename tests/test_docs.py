@@ -5,7 +5,9 @@ that has what a page presupposes: a checkout that is set up and, but for the REA
 README's `make train` leaves. `FAST` names what the fast tests run; the slow ones run all.
 """
 
+import ast
 import functools
+import importlib
 import os
 import re
 import shlex
@@ -30,7 +32,7 @@ from mjcartpole.commands import parsing
 from mjcartpole.media.gl import can_use
 from mjcartpole.page.document import ASSETS
 from nightly import few
-from on_pages import NOT_HERE, SCALED
+from on_pages import NOT_HERE, PICTURES, SCALED
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = ("README.md", *sorted(f"docs/{path.name}" for path in (ROOT / "docs").glob("*.md")))
@@ -75,29 +77,6 @@ PRINTED = {
     ),
 }
 """Blocks that show what a command prints, by their first line; it comes before them."""
-
-PICTURES = {
-    "mjcartpole plot curve runs/tuned-mujoco-seed0 runs/tuned-gym-seeds0-4": {
-        "docs/images/plot_curve.png": "plots/tuned-mujoco-seed0-and-1-other-curve.png",
-    },
-    "mjcartpole plot table runs/tuned-mujoco-seed0": {
-        "docs/images/plot_table.png": "plots/tuned-mujoco-seed0-table.png",
-    },
-    "mjcartpole plot basin runs/tuned-mujoco-seed0": {
-        "docs/images/plot_basin.png": "plots/tuned-mujoco-seed0-basin.png",
-    },
-    "mjcartpole transfer runs/tuned-mujoco-seed0 --sweep pole.length=1:31:2": {
-        "docs/images/sweep_length.png": "transfer/sweep-pole.length.png",
-    },
-    "mjcartpole transfer runs/tuned-mujoco-seed0 runs/braked --sweep hinge.damping=0:1:0.1": {
-        "docs/images/sweep_damping.png": "transfer/sweep-hinge.damping.png",
-    },
-    "python benchmarks/parity_plots.py docs/images": {
-        "docs/images/parity_growth.png": "docs/images/parity_growth.png",
-        "docs/images/parity_energy.png": "docs/images/parity_energy.png",
-    },
-}
-"""Plots that pages show, and what a command has made of each."""
 
 PLAIN = {
     "models/                 MJCF files, hand-written and commented; they ship inside the wheel",
@@ -363,6 +342,16 @@ def test_every_command_is_understood():
     for line in ours:
         if line != "mjcartpole --help":
             parsing.parse(shlex.split(line)[1:])
+
+
+def test_what_python_blocks_import_is_there():
+    found = [block.text for page in PAGES for block in blocks(page) if block.kind == "python"]
+    nodes = [node for text in found for node in ast.walk(ast.parse(text))]
+    ours = [node for node in nodes if "mjcartpole" in (getattr(node, "module", "") or "")]
+    assert len(ours) > 7
+    for node in ours:
+        module = importlib.import_module(node.module)
+        assert [each.name for each in node.names if not hasattr(module, each.name)] == []
 
 
 @pytest.mark.parametrize("page", PAGES)

@@ -40,3 +40,26 @@ SCALED = {
     r"(?<=^python benchmarks/study.py)$": " --runs 2 --turns 1",
 }
 """What takes many minutes, by the same code over fewer seeds, repeats or pixels."""
+
+PICTURES = {
+    "mjcartpole plot curve runs/tuned-mujoco-seed0 runs/tuned-gym-seeds0-4": {
+        "docs/images/plot_curve.png": "plots/tuned-mujoco-seed0-and-1-other-curve.png",
+    },
+    "mjcartpole plot table runs/tuned-mujoco-seed0": {
+        "docs/images/plot_table.png": "plots/tuned-mujoco-seed0-table.png",
+    },
+    "mjcartpole plot basin runs/tuned-mujoco-seed0": {
+        "docs/images/plot_basin.png": "plots/tuned-mujoco-seed0-basin.png",
+    },
+    "mjcartpole transfer runs/tuned-mujoco-seed0 --sweep pole.length=1:31:2": {
+        "docs/images/sweep_length.png": "transfer/sweep-pole.length.png",
+    },
+    "mjcartpole transfer runs/tuned-mujoco-seed0 runs/braked --sweep hinge.damping=0:1:0.1": {
+        "docs/images/sweep_damping.png": "transfer/sweep-hinge.damping.png",
+    },
+    "python benchmarks/parity_plots.py docs/images": {
+        "docs/images/parity_growth.png": "docs/images/parity_growth.png",
+        "docs/images/parity_energy.png": "docs/images/parity_energy.png",
+    },
+}
+"""Plots that pages show, and what a command has made of each."""
