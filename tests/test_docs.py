@@ -87,6 +87,8 @@ PLAIN = {
     "[study]",
     "dask scheduler",
     "from dask_jobqueue import SLURMCluster",
+    "export ATEN_CPU_CAPABILITY=default MKL_ENABLE_INSTRUCTIONS=SSE4_2 ONEDNN_MAX_CPU_ISA=SSE41"
+    " OPENBLAS_CORETYPE=Nehalem",
     "G_t = r_t + γ ((1 − λ) max Q(s_t+1, ·) + λ G_t+1)",  # noqa: RUF001 - a formula
 }
 """First lines of blocks that are neither commands nor Python nor printed."""

@@ -10,6 +10,7 @@ NOT_HERE = {
     "pip install 'mjcartpole[tensorboard]'": "it loads packages from an index",
     "pip install 'mjcartpole[plot]'": "it loads packages from an index",
     "pip install 'mjcartpole[dask]'": "it loads packages from an index",
+    "pip install dask-jobqueue": "it loads packages from an index",
     "pip install mjcartpole": "it loads packages from an index",
     "pip install mujoco gymnasium numpy": "it loads packages from an index",
     "pip install --no-deps mjcartpole": "it loads packages from an index",
@@ -17,6 +18,7 @@ NOT_HERE = {
     "pip install --editable .": "it loads packages from an index",
     "make constraints": "it loads packages from an index",
     "python benchmarks/deep.py": "it needs PyTorch, and hours",
+    "python benchmarks/kills.py": "it needs Dask; test_cluster.py does the like",
     "mjcartpole study docs/study.toml --scheduler tcp://127.0.0.1:8786": "it needs a scheduler",
 }
 """Commands that are not run, and why."""
