@@ -56,7 +56,7 @@ def row(physics, rules, state, grid):
 
 
 RULES = compiled._rules(task.CARTPOLE_V1)
-has_diverged, max_abs = numba.njit(stepping.has_diverged), numba.njit(stepping._max_abs)
+has_diverged, as_one_pole = numba.njit(stepping.has_diverged), numba.njit(stepping._as_one_pole)
 is_over = numba.njit(stepping.is_over)
 
 
@@ -133,17 +133,22 @@ def test_several_poles_are_observed_as_they_are(state):
     assert row(POLES, RULES, (0.0,) * 4, compiled._arrays(grid.grid)) == grid(seen.tolist())
 
 
-@pytest.mark.parametrize("values", [[], [0.0], [-3.0, 2.0], [2.0, -3.0], [1e-320, -1e308]])
+def farthest(*angles):
+    """The angle of one pole in the place of two, as compiled code reads them."""
+    TWO.data.qpos[list(TWO.cartpole.joints[1:])] = angles
+    return as_one_pole(POLES, RULES)[2]
+
+
+@pytest.mark.parametrize("values", [(0.0, 0.0), (-3.0, 2.0), (2.0, -3.0), (1e-320, -1e308)])
 def test_the_farthest_value(values):
-    expected = max(map(abs, values), default=0.0)
-    assert task.max_abs(values) == expected
-    assert max_abs(np.array(values)) == expected
+    assert task.max_abs([]) == 0.0
+    assert farthest(*values) == task.max_abs(values) == max(map(abs, values))
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
-@pytest.mark.parametrize("place", [0, 1, 2])
+@pytest.mark.parametrize("place", [0, 1])
 def test_the_farthest_value_loses_no_nan(bad, place):
-    values = [0.1, -0.2, 0.3]
+    values = [0.1, -0.2]
     values[place] = bad
     assert math.isnan(task.max_abs(values))
-    assert math.isnan(max_abs(np.array(values)))
+    assert math.isnan(farthest(*values))

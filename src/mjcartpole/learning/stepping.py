@@ -11,7 +11,6 @@ Numba can keep in a cache on disk.
 
 from typing import Any
 
-import numba
 import numpy as np
 from numba import types
 from numba.extending import overload
@@ -25,8 +24,7 @@ from mjcartpole.physics import cartpole_v1
 from mjcartpole.physics.simulation import FARTHEST_SANE, LARGEST_SANE
 from mjcartpole.rewards import Reward
 
-_max_abs, _wrapped = compiled(task.max_abs), compiled(task.wrapped)
-_carray = numba.carray  # type: ignore[attr-defined]
+_wrapped = compiled(task.wrapped)
 compiled(cartpole_v1.cartpole_v1_moved)
 _cartpole_v1_step = compiled(cartpole_v1.cartpole_v1_step)
 
@@ -202,12 +200,18 @@ def _as_one_pole(physics: AnyPhysics, rules: Rules) -> State:
 
 @compiled
 def _worst(values: Any, physics: AnyPhysics, turns: bool) -> float:
-    """Return the largest size among the poles' values, of angles that count from -pi to pi."""
-    joints, poles = ints(physics.joints), floats(physics.moved)
+    """Return the `max_abs` of the poles' values, of angles that count from -pi to pi.
+
+    What makes an array of them at an address, for that function, takes a command long to load.
+    """
+    joints = ints(physics.joints)
+    largest, total = 0.0, 0.0
     for index in range(1, physics.n_joints):
         value = values[joints[index]]
-        poles[index - 1] = _wrapped(value) if turns else value
-    return _max_abs(_carray(poles, physics.n_joints - 1))
+        value = _wrapped(value) if turns else value
+        largest = max(largest, abs(value))
+        total += value
+    return largest + 0.0 * total
 
 
 # --- look at it ---------------------------------------------------------------------------------
