@@ -4,12 +4,13 @@ import subprocess
 import sys
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from mjcartpole.commands.parsing import _by_tyro
 from mjcartpole.commands.plain import plain
 from mjcartpole.errors import MjCartPoleError
+from nightly import examples
 
 PLAIN = [
     "train",
@@ -111,7 +112,7 @@ def lines(draw):
 
 
 @pytest.mark.slow
-@settings(deadline=None, max_examples=150)
+@examples(150)
 @given(lines())
 def test_whatever_is_read_is_what_tyro_reads(words):
     found = plain(words)
