@@ -15,7 +15,7 @@ import numpy as np
 from mjcartpole.cores import available_cores
 from mjcartpole.envs.backend import Backend
 from mjcartpole.learning.config import TrainConfig
-from mjcartpole.learning.methods import METHODS
+from mjcartpole.learning.methods import METHODS, method_named
 from mjcartpole.media.curve_plot import Curves, Line
 from mjcartpole.media.plots import write_plot
 from mjcartpole.studies.multi_seed import train_many
@@ -28,8 +28,8 @@ WINDOW = 25
 
 LEARNERS = [
     name
-    for name, method in METHODS.items()
-    if not (hasattr(method, "plan") or hasattr(method, "imagine"))
+    for name in METHODS
+    if not any(hasattr(method_named(name), other) for other in ("plan", "imagine"))
 ]
 """Those that learn from episodes of the world."""
 

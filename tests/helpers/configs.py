@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from mjcartpole import task
 from mjcartpole.learning.config import TrainConfig
-from mjcartpole.learning.methods import METHODS
+from mjcartpole.learning.methods import METHODS, method_named
 from mjcartpole.rewards import minus_one_at_the_end
 from mjcartpole.task import Task
 from nightly import at_night
@@ -98,7 +98,7 @@ def _disturbances(draw, method, backend, mirror):
 
 @st.composite
 def _parameters(draw, method):
-    fields = dataclasses.fields(METHODS[method].Parameters)
+    fields = dataclasses.fields(method_named(method).Parameters)
     values = {each.name: draw(_values(each.name, each.type)) for each in fields}
     if "q_init_low" in values:
         ends = draw(st.tuples(*[st.sampled_from([0.0, 1.0, 60.0]) | st.floats(-99, 99)] * 2))

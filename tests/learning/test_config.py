@@ -3,6 +3,8 @@
 import copy
 import dataclasses
 import math
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -170,3 +172,13 @@ def test_a_number_is_set_or_varies():
 def test_disturbances_that_no_training_has_are_refused(values, said):
     with pytest.raises(ConfigError, match=said):
         TrainConfig(**values)
+
+
+def test_a_training_imports_no_method_but_its_own():
+    code = (
+        "import sys; from mjcartpole.learning.config import METHODS, TrainConfig\n"
+        "TrainConfig(method='double-q'); prefix = 'mjcartpole.learning.methods.'\n"
+        "imported = {name.replace('_', '-').removeprefix(prefix) for name in sys.modules}\n"
+        "print(*imported.intersection(METHODS))"
+    )
+    assert subprocess.check_output([sys.executable, "-c", code], text=True) == "double-q\n"

@@ -25,7 +25,7 @@ from mjcartpole.learning.config import TrainConfig, config_class
 from mjcartpole.learning.discretizer import Discretizer
 from mjcartpole.learning.learner import Learner
 from mjcartpole.learning.linking import compiled
-from mjcartpole.learning.methods import METHODS, action_values, n_step_sarsa, sarsa
+from mjcartpole.learning.methods import METHODS, action_values, method_named, n_step_sarsa, sarsa
 from mjcartpole.learning.methods.experience import Trajectory, Transition
 from mjcartpole.rewards import minus_one_at_the_end, one_per_step
 from nightly import examples, few
@@ -96,7 +96,7 @@ FOUR_STATES = discretizer.Discretizer((4,), (-1.0,), (1.0,))
 @functools.cache
 def both(name):
     """Return the loop of a method in Python, and compiled."""
-    method = METHODS[name]
+    method = method_named(name)
     kernels.learn_chunk(method, one_per_step)
     loop = learning(*(getattr(method, each) for each in CALLED[1:]))
     return loop, numba.njit(error_model="numpy")(loop)
@@ -140,6 +140,10 @@ def test_schedules_are_the_same_line(start, end, length, number):
     assert bits(compiled(schedules.linear)(start, end, length, number)) == bits(expected)
 
 
+def modules():
+    return map(method_named, METHODS)
+
+
 def key_of(entry):
     """What numba looks for in its cache."""
     return entry._cache._index_key((), cpu_target.target_context.codegen())
@@ -148,23 +152,23 @@ def key_of(entry):
 def test_the_same_method_and_reward_are_the_same_entry_of_the_cache():
     def keys():
         kernels.learn_chunk.cache_clear()
-        return [key_of(kernels.learn_chunk(each, one_per_step)) for each in METHODS.values()]
+        return [key_of(kernels.learn_chunk(each, one_per_step)) for each in modules()]
 
     assert keys() == keys()
     # What is made of the very functions of another is told apart by its types.
-    own = {tuple(getattr(method, each) for each in CALLED) for method in METHODS.values()}
+    own = {tuple(getattr(method, each) for each in CALLED) for method in modules()}
     assert len(set(keys())) == len(own) == len(METHODS) - 1
 
 
 def test_the_checksum_covers_all_that_is_compiled_from_elsewhere():
-    for method in METHODS.values():
+    for method in modules():
         kernels.learn_chunk(method, one_per_step)
     known = {function.__module__ for function in kernels._known}
     elsewhere = {module for module in known if module.startswith("mjcartpole.")}
     for module in (kernels, stepping):
         functions = [value.py_func for value in vars(module).values() if hasattr(value, "py_func")]
         elsewhere |= {function.__module__ for function in functions}
-    reached = kernels._reached(*(getattr(m, each) for m in METHODS.values() for each in CALLED))
+    reached = kernels._reached(*(getattr(m, each) for m in modules() for each in CALLED))
     covered = {module.__name__ for module in (*kernels._SHARED, kernels)}
     assert elsewhere <= covered | {function.__module__ for function in reached}
     assert kernels._sources(one_per_step) != kernels._sources(minus_one_at_the_end)

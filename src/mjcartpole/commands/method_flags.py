@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any, Final
 
 from mjcartpole.errors import nearest
-from mjcartpole.learning.methods import METHODS
+from mjcartpole.learning.methods import METHODS, method_named
 
 _FLAG: Final = re.compile(r"--(no[-_])?([^=]+)(=.*)?", re.DOTALL)
 
@@ -35,7 +35,7 @@ def lacking(words: Sequence[str], method: str, others: Iterable[str]) -> str | N
 
 def flags_of(method: str) -> list[str]:
     """Return the flags that are a method's own, without their dashes."""
-    return fields_of(METHODS[method].Parameters)
+    return fields_of(method_named(method).Parameters)
 
 
 def fields_of(group: Any) -> list[str]:  # noqa: ANN401 - any dataclass

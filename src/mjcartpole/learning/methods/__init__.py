@@ -5,8 +5,9 @@ compiled engine compiles them as they are, so they use what Numba knows: arithme
 functions of this package, and the draws of a `numpy.random.Generator`. `Method` says which.
 """
 
+import importlib
 from collections.abc import Callable
-from typing import Any, Final, Protocol
+from typing import Any, Final, Protocol, cast
 
 import gymnasium
 import numpy as np
@@ -15,20 +16,6 @@ import numpy.typing as npt
 from mjcartpole.errors import check_known
 from mjcartpole.learning.discretizer import Discretizer
 from mjcartpole.learning.fitted import Fitted
-from mjcartpole.learning.methods import (
-    actor_critic,
-    double_q,
-    expected_sarsa,
-    identify,
-    model,
-    n_step_sarsa,
-    planning,
-    prioritized_replay,
-    prioritized_sweeping,
-    q_learning,
-    reinforce,
-    sarsa,
-)
 from mjcartpole.learning.methods.experience import Dynamics, Rng, Trajectory, Transition
 from mjcartpole.learning.methods.parameters import Parameters
 
@@ -77,21 +64,21 @@ class Method(Protocol):
         """Return the values of both actions, shape (n_rows, 2), by which a policy decides."""
 
 
-METHODS: Final[dict[str, Any]] = {
-    "q-learning": q_learning,
-    "sarsa": sarsa,
-    "expected-sarsa": expected_sarsa,
-    "n-step-sarsa": n_step_sarsa,
-    "double-q": double_q,
-    "prioritized-replay": prioritized_replay,
-    "prioritized-sweeping": prioritized_sweeping,
-    "model": model,
-    "reinforce": reinforce,
-    "actor-critic": actor_critic,
-    "planning": planning,
-    "identify": identify,
-}
-"""Every method by its name; each value is a `Method`."""
+METHODS: Final = (
+    "q-learning",
+    "sarsa",
+    "expected-sarsa",
+    "n-step-sarsa",
+    "double-q",
+    "prioritized-replay",
+    "prioritized-sweeping",
+    "model",
+    "reinforce",
+    "actor-critic",
+    "planning",
+    "identify",
+)
+"""Every method by its name; its module, a `Method`, is called alike and imported when asked for."""
 
 
 def method_named(name: str) -> Method:
@@ -101,5 +88,4 @@ def method_named(name: str) -> Method:
         ConfigError: There is none.
     """
     check_known("method", name, METHODS)
-    method: Method = METHODS[name]
-    return method
+    return cast(Method, importlib.import_module(f"{__name__}.{name.replace('-', '_')}"))
