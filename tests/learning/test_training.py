@@ -35,7 +35,7 @@ def test_the_docstrings_hold():
     ("preset", "backend"),
     few(
         [(name, "mujoco") for name in LEARNED]
-        + [(name, "gym") for name in LEARNED if "model" not in PRESETS[name]],
+        + [(name, "gym") for name in LEARNED if not {"model", "set"} & {*PRESETS[name]}],
         *(("tuned", "mujoco"), ("two-poles", "mujoco"), ("article", "gym"), ("quick", "gym")),
     ),
 )
@@ -46,7 +46,9 @@ def test_one_seed_gives_one_table_and_two_seeds_give_two(preset, backend):
     first, again, other = run(7), run(7), run(8)
     assert first.q_table.tobytes() == again.q_table.tobytes()
     np.testing.assert_array_equal(first.returns, again.returns)
-    assert first.steps == again.steps == first.returns.sum()
+    assert first.steps == again.steps
+    if first.config.task == "CartPole-v1":  # One for each step.
+        assert first.steps == first.returns.sum()
     assert first.q_table.tobytes() != other.q_table.tobytes()
     assert len(first.returns) == 40
 
