@@ -5,7 +5,7 @@
     python benchmarks/deep.py table docs/deep.jsonl
 
 Without a word it trains each learner on each backend and seed, one after the other, in one thread,
-and keeps a line of JSON for each in --file as it comes: a run that was killed goes on where it was.
+and keeps a line of JSON for each in file as it comes: a run that was killed goes on where it was.
 It needs Stable-Baselines3 and PyTorch (on the processor: pip install 'mjcartpole[deep]') and about
 a minute for each seed of a deep learner on a backend, two hours in all; tables take seconds.
 `table` prints what such a file says, as Markdown, and needs neither.

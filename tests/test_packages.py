@@ -24,7 +24,7 @@ from mjcartpole.packages import is_installed, missing
 THREE = "mujoco", "gymnasium", "numpy"
 WORKS = """
     import hashlib, json, logging
-    import gymnasium, numpy, mjcartpole
+    import gymnasium, numpy, mjcartpole, mjcartpole.page.report
     logging.basicConfig(level=logging.INFO, format="%(message)s")
 
     env = gymnasium.make("mjcartpole/CartPole-v1", model="long")

@@ -13,6 +13,8 @@ from pathlib import Path
 import pytest
 
 from command_line import call
+from mjcartpole.commands import films
+from mjcartpole.errors import RenderError
 from mjcartpole.learning import runs
 from mjcartpole.learning.checkpoints import LATEST
 from mjcartpole.learning.config import TrainConfig
@@ -38,6 +40,25 @@ def test_without_tensorboardx_nothing_is_begun(here, fork):
     assert child.err.count("\n") == 1
     assert "pip install 'mjcartpole[tensorboard]'" in child.err
     assert (child.out, Path("run").exists()) == ("", False)
+
+
+def test_a_film_without_pillow_is_refused_before_training(here, fork, capsys, monkeypatch):
+    def without_pillow(words):
+        child = fork(words, prepare=lambda: sys.modules.update(PIL=None))
+        assert (child.wait(), child.out) == (2, "")
+        assert child.err == (
+            "mjcartpole: error: a film needs the package pillow: pip install pillow; "
+            "or leave it out: --no-video\n"
+        )
+
+    def full(*_):
+        raise RenderError("no film")
+
+    without_pillow([*FILM, "run"])
+    assert not Path("run").exists()
+    monkeypatch.setattr(films, "film_result", full)
+    assert call([*FILM, "run"], capsys)[0] == 2
+    without_pillow(["train", "--resume", "run"])
 
 
 def test_what_training_prints(here, capsys):

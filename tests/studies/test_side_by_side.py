@@ -2,6 +2,9 @@
 
 import itertools
 import os
+import signal
+import subprocess
+import sys
 from concurrent.futures import BrokenExecutor, Future
 
 import pytest
@@ -63,3 +66,21 @@ def test_a_process_that_dies_fails_its_jobs_and_those_behind_it():
     failed = [future.exception() for _, future in filter(None, found)]
     assert len(failed) == 9
     assert all(isinstance(each, BrokenExecutor) for each in failed)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(os.name == "nt", reason="there are no such signals")
+def test_the_workers_of_parity_end_with_it_and_in_silence():
+    code = """
+import os, signal, threading
+from mjcartpole.physics.load import load_model
+from mjcartpole.studies.parity import Subject, learning
+learning.worker_count = lambda *_: 2
+threading.Timer(8, os.kill, (os.getpid(), signal.SIGTERM)).start()
+learning.learning(Subject(load_model("cartpole")))
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=120, check=False
+    )
+    assert done.returncode == -signal.SIGTERM
+    assert "Traceback" not in done.stderr

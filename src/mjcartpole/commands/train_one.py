@@ -16,6 +16,7 @@ from mjcartpole.commands.train_shared import (
     prepare,
     unfinished,
 )
+from mjcartpole.errors import RenderError
 from mjcartpole.files import check_writable, make_folder
 from mjcartpole.learning import runs
 from mjcartpole.learning.checkpoints import LATEST
@@ -23,6 +24,7 @@ from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.runs import Begun
 from mjcartpole.learning.session import Session
 from mjcartpole.learning.training import Training, TrainResult
+from mjcartpole.packages import is_installed, missing
 from mjcartpole.signals import Interrupted, StopSignals
 from mjcartpole.studies.finish_training import finish_training
 
@@ -36,6 +38,7 @@ def train(config: TrainConfig, how: TrainOptions, where: RunLocation) -> int:
     cartpole = prepare(config, how)
     folder = where.folder(config)
     begun = Begun(folder, where.preset, how.video, config, cartpole, checkpoint=None)
+    _check_film(begun, how)
     signals = StopSignals()
     with signals.caught(), runs.claimed_folder(folder, overwrite=where.overwrite):
         if how.video:
@@ -66,6 +69,7 @@ def resume(path: Path, how: TrainOptions) -> int:
         return 0
     signals = StopSignals()
     with signals.caught(), runs.resumed_folder(path, how.allow_assets) as begun:
+        _check_film(begun, how)
         config, session = begun.config, _session(begun, how)
         print(
             f"{begun.preset} on {config.backend}: goes on after {_done(session)}, "
@@ -74,6 +78,12 @@ def resume(path: Path, how: TrainOptions) -> int:
         )
         _finish(session, begun, how, signals)
     return 0
+
+
+def _check_film(begun: Begun, how: TrainOptions) -> None:
+    """Refuse a film that could not be drawn, before anything is trained."""
+    if how.video and begun.video and not is_installed("PIL"):
+        raise RenderError(f"{missing('a film', 'PIL')}; or leave it out: --no-video")
 
 
 def _session(begun: Begun, how: TrainOptions) -> Session:

@@ -17,7 +17,6 @@ from mjcartpole.files import read_bytes
 from mjcartpole.learning.naming import added_flags
 from mjcartpole.page.told import Told
 from mjcartpole.physics.bodies import starting_state
-from mjcartpole.studies.film import play
 from mjcartpole.studies.policy_setup import PolicySetup
 from mjcartpole.task import CARTPOLE_V1, CONTROL_STEP
 
@@ -40,6 +39,8 @@ def run_data(setup: PolicySetup, told: Told, backend: str) -> dict[str, Any]:
         FileError: A file of the model cannot be read.
         SimulationError: The physics diverged.
     """
+    from mjcartpole.studies.film import play  # noqa: PLC0415 - a report's page needs no Pillow
+
     check_shown(setup)
     cartpole, (rollout,) = setup.cartpole, play(_recorded(setup))
     document, files = cartpole.stored

@@ -24,7 +24,6 @@ from mjcartpole.media.grid_plot import Grid, Kind
 from mjcartpole.media.grid_plot import Path as PlanePath
 from mjcartpole.media.plots import Plot
 from mjcartpole.studies.basin import basin, limit_along
-from mjcartpole.studies.film import play
 from mjcartpole.studies.policy_setup import PolicySetup, find_setup
 from mjcartpole.studies.run_curves import curves_of, read_groups
 from mjcartpole.studies.statistics import Average
@@ -129,6 +128,8 @@ def phase(
         ConfigError: There is no such dimension, or no episode.
         SimulationError: The physics diverged.
     """
+    from mjcartpole.studies.film import play  # noqa: PLC0415 - other plots need no Pillow
+
     policy = setup.table
     check_of_state(policy.discretizer, dims)
     axes = choose_axes(policy.discretizer, dims, "none", at)

@@ -120,6 +120,11 @@ def _begin_worker(stopped: Event) -> None:
     """Leave signals to the process that began the work; it says when to stop."""
     global _stopped  # noqa: PLW0603 - the pool has no other way to hand an event over
     _stopped = stopped
+    leave_to_parent()
+
+
+def leave_to_parent() -> None:
+    """Leave Ctrl-C to the process that began this worker, and end with it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
 

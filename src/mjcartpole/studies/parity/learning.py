@@ -15,6 +15,7 @@ from mjcartpole.learning.training import Training
 from mjcartpole.studies.parity.case import Subject, Vector
 from mjcartpole.studies.parity.result import Figure, Question, Result
 from mjcartpole.studies.parity.significance import STUDENT
+from mjcartpole.studies.side_by_side import leave_to_parent
 
 SEEDS: Final = 20
 """`STUDENT` is for as many."""
@@ -109,7 +110,7 @@ def _run_all(jobs: list[_Job], quick: bool) -> list[list[list[float]]]:
     if workers == 1:
         return [_run_one(job) for job in jobs]
     # A fresh interpreter each: nothing of OpenGL or threads is inherited.
-    with multiprocessing.get_context("spawn").Pool(workers) as pool:
+    with multiprocessing.get_context("spawn").Pool(workers, leave_to_parent) as pool:
         return pool.map(_run_one, jobs, chunksize=1)
 
 
