@@ -34,5 +34,12 @@ def test_a_long_training_is_tried_for_a_while_only():
     assert expect(plan(study).runs, seconds=0.05).steps > 1e9
 
 
+def test_what_does_not_come_since_it_is_solved_before_does_not_count():
+    base = {"backend": "gym", "episodes": 100_000, "until": 0, "evaluate_every": 5}
+    study = {"seeds": 1, "measure": ["area_under_curve"]}
+    solved = plan(study_of({"study": study, "base": base, "factors": {"alpha": [0.1]}})).runs
+    assert expect(solved).steps < 1e6
+
+
 def test_nothing_takes_no_time():
     assert expect([]).steps == 0

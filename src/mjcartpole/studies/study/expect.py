@@ -50,9 +50,11 @@ def _of_one(job: SeedJob, seconds: float) -> Expected:
             break
     result = training.result()
     done, lengths, config = len(result.returns), result.episodes.columns.steps, job.config
+    # Where it was solved before they are over, the rest does not come.
+    whole = done if training.is_over else config.episodes
     # Those that come are taken to be as long as the last ones.
     late = float(lengths[-max(1, done // 10) :].mean())
     period = config.evaluation_period
-    evaluations = (config.episodes // period if period else 0) + job.evaluated
-    steps = result.steps + (config.episodes - done + EPISODES * evaluations) * late
+    evaluations = (whole // period if period else 0) + job.evaluated
+    steps = result.steps + (whole - done + EPISODES * evaluations) * late
     return Expected(steps, steps * result.seconds / max(1, result.steps))
