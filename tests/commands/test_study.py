@@ -1,5 +1,6 @@
 """The command study: from a file to tables, and on from there."""
 
+import contextlib
 import csv
 import json
 import os
@@ -13,9 +14,11 @@ from pathlib import Path
 import pytest
 
 from command_line import call
+from mjcartpole.commands import study_run
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.evaluation import evaluate
 from mjcartpole.learning.training import train
+from mjcartpole.studies.study.expect import Expected
 from mjcartpole.studies.study.records import LOG
 
 FILE = """
@@ -129,6 +132,27 @@ def test_a_dry_run_says_what_it_would_be_and_keeps_nothing(ask, capsys):
         "with 2 at once",
     )
     assert [word for word in words if word not in out] == []
+
+
+@pytest.mark.parametrize(
+    ("flags", "there", "said"),
+    [
+        (["--workers", 8], 0, "50 s with 8 at once"),
+        (["--workers", 1], 0, "1 min 40 s with 1 at once"),
+        (["--scheduler", "a:1"], 4, "25 s with 4 at once"),
+        (["--scheduler", "a:1"], 0, "1 min 40 s with one worker; the scheduler has none yet"),
+    ],
+)
+def test_the_time_of_a_dry_run_is_that_of_the_cores_there_are(
+    ask, capsys, monkeypatch, flags, there, said
+):
+    ask()
+    monkeypatch.setattr(study_run, "connected", lambda _: contextlib.nullcontext(object()))
+    monkeypatch.setattr(study_run, "threads_of", lambda _: there)
+    monkeypatch.setattr(study_run, "available_cores", lambda: 2)
+    monkeypatch.setattr(study_run, "expect", lambda _: Expected(10, 100))
+    code, out, _ = call(["study", "a.toml", "--dry-run", *flags], capsys)
+    assert code == 0 and f"time     about {said}\n" in out
 
 
 def test_each_mistake_has_its_line(ask, capsys):

@@ -33,7 +33,8 @@ def test_the_value_of_a_flag():
     assert value_of("--preset", ["train", "--preset", "article"], "tuned") == "article"
     assert value_of("--preset", ["--preset=article", "--preset", "x"], "tuned") == "article"
     assert value_of("--preset", ["train", "--presets", "x"], "tuned") == "tuned"
-    assert value_of("--preset", ["--preset"], "tuned") == ""
+    for words in (["--preset"], ["--preset", "--seed", "3"]):
+        assert value_of("--preset", words, "tuned") == "tuned"
 
 
 @dataclass(frozen=True)

@@ -79,8 +79,11 @@ def test_ishigamis_function_has_its_published_indices():
     assert sum(found.values()) == pytest.approx(1)
 
 
-def test_scores_that_do_not_vary_are_explained_by_nothing():
-    assert variance_shares([3.0] * 4, grid(2, 2)) == {("a",): 0, ("b",): 0, ("a", "b"): 0}
+@pytest.mark.parametrize(("score", "n"), [(3.0, 6), (0.1, 12), (118 / 3, 10)])
+def test_scores_that_do_not_vary_are_explained_by_nothing(score, n):
+    # The mean of twelve times 0.1 is not 0.1.
+    found = variance_shares(np.full(n, score), {"a": np.arange(n) % 2, "b": np.arange(n) // 2 % 2})
+    assert not any(found.values())
 
 
 def test_levels_that_do_not_fit_are_refused():

@@ -9,7 +9,7 @@ from pathlib import Path
 from mjcartpole.commands import progress
 from mjcartpole.commands.printing import counted
 from mjcartpole.commands.study_options import StudyOptions
-from mjcartpole.cores import worker_count
+from mjcartpole.cores import available_cores, worker_count
 from mjcartpole.output import FAILED
 from mjcartpole.physics.simulation import silence_mujoco
 from mjcartpole.signals import Interrupted, StopSignals
@@ -39,7 +39,7 @@ def run(file: Path, folder: Path, how: StudyOptions) -> int:
     cluster = connected(how.scheduler) if how.scheduler is not None else contextlib.nullcontext()
     with signals.caught(), cluster as client:
         if how.dry_run:
-            return _dry_run(planned, folder, how, threads_of(client) if client else how.workers)
+            return _dry_run(planned, folder, how, threads_of(client) if client else None)
         with claimed_study(folder, planned.study.text, how.resume, how.overwrite):
             log = RecordLog(folder)
             left = left_of(planned, log)
@@ -58,7 +58,7 @@ def run(file: Path, folder: Path, how: StudyOptions) -> int:
             return _tell_failed(planned, log, folder, signals, again)
 
 
-def _dry_run(planned: Plan, folder: Path, how: StudyOptions, workers: int | None) -> int:
+def _dry_run(planned: Plan, folder: Path, how: StudyOptions, there: int | None) -> int:
     left = left_of(planned, RecordLog(folder)) if how.resume else unique(planned)
     _print_size(planned)
     for name in planned.study.measure:
@@ -66,10 +66,14 @@ def _dry_run(planned: Plan, folder: Path, how: StudyOptions, workers: int | None
     if how.resume:
         print(f"left     {counted(len(left), 'run')}")
     if left:
-        expected, workers = expect(left), worker_count(workers, len(left))
+        expected = expect(left)
+        workers = worker_count(how.workers, len(left)) if there is None else min(there, len(left))
+        # More at once than there are cores share them.
+        share = min(workers, available_cores()) if there is None else workers
+        at_once = f"{workers} at once" if workers else "one worker; the scheduler has none yet"
         print(
             f"steps    about {expected.steps:.2g}\n"
-            f"time     about {in_time(expected.seconds / workers)} with {workers} at once"
+            f"time     about {in_time(expected.seconds / max(1, share))} with {at_once}"
         )
     return 0
 

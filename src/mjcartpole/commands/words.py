@@ -55,9 +55,9 @@ def _gathered(words: Sequence[str], flag: str, sign: str) -> list[str]:
 
 
 def value_of(flag: str, words: Sequence[str], otherwise: str) -> str:
-    """Return the value that the words give to a flag."""
-    for word, following in zip(words, [*words[1:], ""], strict=True):
-        if word == flag:
+    """Return the value that the words give to a flag; of one without a value tyro complains."""
+    for word, following in zip(words, [*words[1:], "--"], strict=True):
+        if word == flag and not following.startswith("--"):
             return following
         if word.startswith(f"{flag}="):
             return word.removeprefix(f"{flag}=")

@@ -95,7 +95,8 @@ def variance_shares(
     values = checked_scores(scores)
     if any(labels.shape != values.shape for labels in factors.values()):
         raise ConfigError(f"a level is needed for each score, shape {values.shape}")
-    total = float(((values - values.mean()) ** 2).sum())
+    # Of equal values, the mean may be another number by a rounding.
+    total = float(((values - values.mean()) ** 2).sum()) if np.ptp(values) > 0 else 0.0
     found: dict[tuple[str, ...], float] = {}
     for name, labels in factors.items():
         found[name,] = _between(values, labels, total)

@@ -78,7 +78,7 @@ def test_files_that_a_model_names_travel_with_it(tmp_path):
 def test_a_worker_of_another_version_is_refused():
     parcel = Parcel.of(first_run(episodes=2))
     other = dataclasses.replace(parcel, versions=parcel.versions | {"mujoco": "0.9"})
-    with pytest.raises(ConfigError, match=r"this worker has mujoco .*, and here it is 0\.9"):
+    with pytest.raises(ConfigError, match=r"a worker on .* has mujoco .*, and here it is 0\.9"):
         run_parcel(other)
     assert len(versions_here()["mjcartpole's sources"]) == 8
 

@@ -2,6 +2,8 @@
 
 import pytest
 
+from mjcartpole.errors import SimulationError
+from mjcartpole.learning.training import Training
 from mjcartpole.studies.study.expect import expect
 from mjcartpole.studies.study.plan import plan
 from mjcartpole.studies.study.records import do_run
@@ -32,6 +34,25 @@ def test_a_long_training_is_tried_for_a_while_only():
     base = {"backend": "gym", "episodes": 100_000_000}
     study = study_of({"study": {"seeds": 1}, "base": base, "factors": {"alpha": [0.1]}})
     assert expect(plan(study).runs, seconds=0.05).steps > 1e9
+
+
+def test_what_does_not_come_since_it_is_solved_before_does_not_count():
+    base = {"backend": "gym", "episodes": 100_000, "until": 0, "evaluate_every": 5}
+    study = {"seeds": 1, "measure": ["area_under_curve"]}
+    solved = plan(study_of({"study": study, "base": base, "factors": {"alpha": [0.1]}})).runs
+    assert expect(solved).steps < 1e6
+
+
+def test_a_training_that_fails_does_not_end_it(monkeypatch):
+    runs, whole = runs_of(seeds=1), Training.run
+
+    def run(self):
+        if self.config.alpha == 0.1:
+            raise SimulationError("the physics diverged")
+        return whole(self)
+
+    monkeypatch.setattr(Training, "run", run)
+    assert expect(runs[:1]).steps == 0 and expect(runs).steps > 0
 
 
 def test_nothing_takes_no_time():

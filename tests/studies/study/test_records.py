@@ -100,6 +100,12 @@ def test_lines_of_somebody_else_are_left_out(record, tmp_path, line):
     assert set(log.found) <= {"k1"}
 
 
+@pytest.mark.parametrize("points", [{"curve": [[]]}, {"curve": [[1, 2, 3]]}, {"greedy": [[1, 2]]}])
+def test_a_line_whose_curves_are_no_points_is_left_out(record, tmp_path, points):
+    (tmp_path / LOG).write_bytes(dataclasses.replace(record, **points).line())
+    assert RecordLog(tmp_path).damaged == 1
+
+
 def test_a_log_that_is_none_is_refused(tmp_path):
     (tmp_path / LOG).mkdir()
     with pytest.raises(FileError, match="a folder where a plain file is needed"):

@@ -189,6 +189,36 @@ def test_a_range_is_told_in_parts(tmp_path):
     assert np.bincount(alpha.labels).tolist() == [10] * 4
 
 
+@pytest.mark.parametrize(
+    ("design", "count", "given", "meant"),
+    [
+        ('design = "latin"\nsamples = 40', 40, "alpha=0.3", "0.244 to 0.487"),
+        ('design = "latin"\nsamples = 40', 40, "alpha=1", "0.731 to 0.975"),
+        ('design = "latin"\nsamples = 4', 4, "alpha=0.06", "0.05"),
+        ("", 41, "alpha=0.3", "0.25 to 0.5"),
+    ],
+)
+def test_a_base_line_of_a_range_is_where_the_nearest_run_was(tmp_path, design, count, given, meant):
+    levels = "" if design else ", levels = 41"
+    text = FILE.replace("[0.1, 0.3]", f"{{low = 0, high = 1{levels}}}")
+    text = text.replace("seeds = 4", f"seeds = 1\n{design}")
+    some = [{**rows()[0], "point": n, "alpha": n / 40} for n in range(count)]
+    results = read_results(write(tmp_path / "mine", some, text))
+    assert results.baseline([given])["alpha"] == meant
+    for level in ("1.5", "x", "nan"):
+        with pytest.raises(ConfigError, match=f"alpha: level '{level}' is unknown"):
+            results.baseline([f"alpha={level}"])
+
+
+def test_a_range_of_which_many_runs_have_one_number_has_no_empty_part(tmp_path):
+    text = FILE.replace("[0.1, 0.3]", "{low = 0, high = 1}")
+    text = text.replace("seeds = 4", 'seeds = 1\ndesign = "random"\nsamples = 40')
+    some = [{**rows()[0], "point": n, "alpha": max(0, n - 20) / 40} for n in range(40)]
+    results = read_results(write(tmp_path / "mine", some, text))
+    assert np.bincount(results.levels[0].labels).min() > 0
+    assert said_of(results)
+
+
 def three_factors():
     """What only three together explain, and seeds: +1 or -1 by parity, and a tenth for a seed."""
     levels = {"alpha": ("0.1", "0.3"), "ties": ("first", "random"), "gamma": ("0.9", "1.0")}
@@ -239,6 +269,12 @@ def test_points_and_runs_that_are_alike_are_counted(tmp_path):
     worst = next(each for each in solved.tables if each.title == "worst runs")
     assert worst.note == "As bad as the last of these: 11 more."
     assert "16 of 16 runs never came to it" in solved.tables[1].note
+
+
+def test_rounding_explains_nothing(tmp_path):
+    some = [{**row, "greedy_mean": 0.1 * (row["seed"] + 1)} for row in rows()[:4]]
+    (section, _) = said_of(read_results(write(tmp_path / "mine", some)))
+    assert "no factor explains more" in section.sentence
 
 
 def test_a_single_run_has_no_interval(tmp_path):

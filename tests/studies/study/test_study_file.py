@@ -68,6 +68,7 @@ def test_a_file_means_what_it_says(tmp_path):
         ("[factors]\nalpha = {low = -inf, high = 1, levels = 3}", "low below high"),
         ("[factors]\nalpha = {low = 0, high = 1}", "a grid needs levels = N"),
         ("[factors]\nalpha = [0.1, 0.2, 0.10]", "alpha has the level 0.1 more than once"),
+        ("[factors]\npole.length = [0.5, '0.5']", "pole.length has the level 0.5 more than once"),
         ("[factors]\nepisodes = {low = 1, high = 3, levels = 9}", "only 3 of 9"),
         (
             "[study]\ndesign = 'latin'\nsamples = 3\n"
@@ -75,7 +76,7 @@ def test_a_file_means_what_it_says(tmp_path):
             'levels = N is for a grid; design = "latin" draws from all of a range',
         ),
         ("[factors]\nalpha = {low = 0, hihg = 1}", "did you mean 'high'?"),
-        ("[factors]\nalpha = {low = 0, high = 1, levels = 1}", "a whole number from 2 up"),
+        ("[factors]\nalpha = {low = 0, high = 1, levels = 1}", "from 2 to 100,000"),
         ("[factors]\nmethod = {low = 0, high = 1}", "method is no number"),
         ("[base]\nalpha = 1\n[factors]\nalpha = [0.1]", "in [base] and in [factors]"),
         ("[study]\nseeds = -1\n[factors]\nalpha = [1]", "seeds must be how many"),
@@ -87,6 +88,18 @@ def test_a_file_means_what_it_says(tmp_path):
         ("[study]\ndesign = 'random'\n[factors]\nalpha = [1]", "needs samples = N"),
         ("[study]\nsamples = 9\n[factors]\nalpha = [1]", "a grid has all combinations"),
         ("[study]\nbaseline = {alpha = 0.3}\n[factors]\nalpha = [1]", "0.3 is none of the levels"),
+        (
+            "[study]\nbaseline = {alpha = 3}\n[factors]\nalpha = {low = 0, high = 1, levels = 3}",
+            "3.0 is none of the levels",
+        ),
+        (
+            "[study]\nbaseline = {alpha = 3}\ndesign = 'latin'\nsamples = 3\n"
+            "[factors]\nalpha = {low = 0, high = 1}",
+            "3.0 is none of the levels",
+        ),
+        ("factors = 3", "factors must be a table"),
+        ("[study]\ndesign = 'latn'\nsamples = 5\n[factors]\nalpha = [1]", "mean 'latin'?"),
+        ("[study]\nbaseline = {alpha = 1}\n[factors]\nalpha = 1", "belongs to [base]"),
         ("[study]\nbaseline = {gamma = 0.3}\n[factors]\nalpha = [1]", "none of the factors"),
         ("[robustness]\nnoise = 0.1\n[factors]\nalpha = [1]", "belong together"),
         ("[study]\nmeasure = ['robust_mean']\n[factors]\nalpha = [1]", "belong together"),
@@ -141,6 +154,11 @@ def test_what_is_no_toml_is_refused(tmp_path, content):
     (tmp_path / "a.toml").write_bytes(content)
     with pytest.raises(FileError, match="is no TOML"):
         read_study(tmp_path / "a.toml")
+
+
+def test_a_byte_order_mark_is_no_part_of_it(tmp_path):
+    (tmp_path / "a.toml").write_bytes(b"\xef\xbb\xbf[factors]\nalpha = [1]")
+    assert read_study(tmp_path / "a.toml").text == "[factors]\nalpha = [1]"
 
 
 def test_a_file_that_is_too_large_is_not_read(tmp_path):

@@ -12,6 +12,7 @@ import hashlib
 import logging
 import math
 import re
+import socket
 import struct
 import tempfile
 import threading
@@ -95,7 +96,7 @@ def run_parcel(parcel: Parcel) -> Record | None:
     Raises:
         ConfigError: The worker has other versions than where the run comes from.
     """
-    check_versions(versions_here(), parcel.versions, "this worker")
+    check_versions(versions_here(), parcel.versions, f"a worker on {socket.gethostname()}")
     _stop_timers()
     with tempfile.TemporaryDirectory() if parcel.files else contextlib.nullcontext("") as folder:
         for name, content in parcel.files.items():

@@ -36,6 +36,12 @@ class Range:
     whole: bool = False
     levels: int | None = None
 
+    def __contains__(self, number: object) -> bool:
+        """Return whether it is one of the levels, or where none were said a number of the range."""
+        if self.levels is not None:
+            return number in self.evenly()
+        return isinstance(number, int | float) and self.low <= number <= self.high
+
     def at(self, share: float) -> float:
         """Return the number at a share of the way, from 0 to 1.
 

@@ -80,7 +80,10 @@ class Record:
         Raises:
             ValueError: It is none.
         """
-        return cls(**checked(parse(line), _FIELDS))
+        found = cls(**checked(parse(line), _FIELDS))
+        if {*map(len, found.curve)} - {2} or {*map(len, found.greedy)} - {4}:
+            raise ValueError("a point of a curve has too few or too many numbers")
+        return found
 
     def line(self) -> bytes:
         """Return it as a line of the log."""

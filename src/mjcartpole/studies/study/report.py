@@ -35,6 +35,8 @@ WORST: Final = 5
 MOST_CELLS: Final = 64
 """Of a pair of factors that has a table."""
 THRESHOLDS: Final = 5
+_ROUNDING: Final = 1e-9
+"""A share of variance that is none."""
 
 Labels = npt.NDArray[np.int64]
 
@@ -252,7 +254,7 @@ def _sensitivity(of: OfMeasure, shares: dict[tuple[str, ...], float]) -> Table:
         (" and ".join(names), f"{share:.1%}", f"{of.by_chance(names):.1%}")
         for names, share in sorted(shares.items(), key=lambda item: -item[1])
     ]
-    rest = 1 - sum(shares.values()) if of.scores.std() > 0 else 0.0
+    rest = 1 - sum(shares.values()) if np.ptp(of.scores) > 0 else 0.0
     if together := of.together(shares):
         rest -= together[0]
         rows.append(("more than two together", *(f"{share:.1%}" for share in together)))
@@ -319,7 +321,7 @@ def _sentence(of: OfMeasure, points: Sequence[Labels], shares: dict[tuple[str, .
         + f": IQM {middle} ({trust})"
     )
     names, share = max(shares.items(), key=lambda item: item[1])
-    if share <= of.by_chance(names):
+    if share < of.by_chance(names) + _ROUNDING:
         return f"{said}; no factor explains more of the variance than chance would."
     what = f"the interaction of {' and '.join(names)}" if names[1:] else names[0]
     return f"{said}; {what} explains most: {share:.0%} of the variance."

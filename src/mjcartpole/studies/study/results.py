@@ -1,5 +1,6 @@
 """The results of a study, read back from its folder as if somebody else had written them."""
 
+import contextlib
 import csv
 import io
 import itertools
@@ -35,11 +36,13 @@ class Levels:
         name: The factor's.
         names: Its levels, as a table has them.
         labels: Which of these it was, shape (runs,).
+        numbers: What it was, shape (runs,), of a range in parts, or that levels were drawn from.
     """
 
     name: str
     names: tuple[str, ...]
     labels: npt.NDArray[np.int64]
+    numbers: npt.NDArray[np.float64] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +95,7 @@ class Results:
             asked[name] = level
         found |= asked
         for factor, each in zip(self.study.factors, self.levels, strict=True):
-            level = found[each.name]
+            level = found[each.name] = _with_nearest(factor, each, found[each.name])
             if level not in each.names and level in map(as_text, factor.on_grid()):
                 raise ConfigError(
                     f"no run with {each.name}={level}, the base line, is done yet, or all failed; "
@@ -159,23 +162,36 @@ def _number(text: str) -> float:
     return float(text) if text else math.nan
 
 
+def _with_nearest(factor: Factor, levels: Levels, text: str) -> str:
+    """Return a level as it is; of a number of a range, the level of the nearest run."""
+    if levels.numbers is None or text in levels.names:
+        return text
+    with contextlib.suppress(ValueError):
+        if (number := float(text)) in factor.levels:
+            return levels.names[int(levels.labels[np.abs(levels.numbers - number).argmin()])]
+    return text
+
+
 def _levels(factor: Factor, texts: list[str]) -> Levels:
-    there = set(texts)
+    there, numbers = set(texts), None
     if isinstance(factor.levels, Range):
+        given = np.array([float(text) for text in texts])
         if len(there) > 2 * PARTS:
-            return _parts(factor.name, np.array([float(text) for text in texts]))
+            return _parts(factor.name, given)
+        numbers = given if factor.levels.levels is None else None
         names = sorted(there, key=float)
     else:
         names = [name for name in map(as_text, factor.levels) if name in there]
     if others := there.difference(names):
         raise ValueError(f"{factor.name} has no level {min(others)!r}")
     places = {name: place for place, name in enumerate(names)}
-    return Levels(factor.name, tuple(names), np.array([places[text] for text in texts]))
+    return Levels(factor.name, tuple(names), np.array([places[text] for text in texts]), numbers)
 
 
 def _parts(name: str, values: npt.NDArray[np.float64]) -> Levels:
     """Return a range as so many parts with as many runs each."""
-    ends = np.quantile(values, np.linspace(0, 1, PARTS + 1))
-    labels = np.clip(np.searchsorted(ends, values, "right") - 1, 0, PARTS - 1)
+    # Where a number is that of a quarter of the runs, two ends are one.
+    ends = np.unique(np.quantile(values, np.linspace(0, 1, PARTS + 1)))
+    labels = np.clip(np.searchsorted(ends, values, "right") - 1, 0, len(ends) - 2)
     names = [f"{low:.3g} to {high:.3g}" for low, high in itertools.pairwise(ends)]
-    return Levels(name, tuple(names), labels)
+    return Levels(name, tuple(names), labels, values)

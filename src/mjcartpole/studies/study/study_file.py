@@ -78,7 +78,7 @@ def read_study(path: Path) -> Study:
     """
     content = read_bytes(path, MOST_BYTES, follow=True)
     try:
-        text = content.decode("utf-8")
+        text = content.decode("utf-8-sig")  # Windows may begin it with a byte order mark.
         values = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
         raise FileError(f"'{path}' is no TOML: {brief(error)}") from error
@@ -99,15 +99,15 @@ def study_of(values: Mapping[str, Any], text: str = "") -> Study:
     about = _about(tables["study"], mistakes)
     base = dict(_each(tables["base"], "base", _setting, mistakes))
     factors = tuple(each for _, each in _each(tables["factors"], "factors", _factor, mistakes))
-    if not tables["factors"]:
+    if values.get("factors", {}) == {}:
         mistakes.append(
             "[factors] is empty, so there is nothing to compare; give one at least, such as "
             "alpha = [0.05, 0.1] (one config with many seeds is `mjcartpole train --seeds`)"
         )
     robustness = _robustness(tables["robustness"], mistakes)
     study = Study(**about, robustness=robustness, base=base, factors=factors, text=text)
-    mistakes += _together(study)
-    raise_all(mistakes)
+    # Where a part is wrong, what it has to do with others is not known.
+    raise_all(mistakes or list(_together(study)))
     return study
 
 
@@ -173,8 +173,12 @@ def _factor(name: str, value: Any) -> Factor:  # noqa: ANN401
     levels = tuple(read_value(name, each) for each in value)
     if not levels:
         raise ConfigError(f"{name} has no levels, so there is no point; give one at least")
-    if twice := [each for each in dict.fromkeys(levels) if levels.count(each) > 1]:
-        raise ConfigError(f"{name} has the level {as_text(twice[0])} more than once; give it once")
+    # Equal values, or others that a table would show alike, such as 0.5 and "0.5".
+    for alike in levels, tuple(map(as_text, levels)):
+        if twice := [each for each in dict.fromkeys(alike) if alike.count(each) > 1]:
+            raise ConfigError(
+                f"{name} has the level {as_text(twice[0])} more than once; give it once"
+            )
     return Factor(name, levels)
 
 
@@ -194,7 +198,9 @@ def _range(name: str, value: dict[str, Any]) -> Range:
     if type(log) is not bool or (log and numbers[0] <= 0):
         raise ConfigError(f"{name}: log is true or false, and needs a range above 0")
     if levels is not None and not (type(levels) is int and 2 <= levels <= MOST_POINTS):
-        raise ConfigError(f"{name}: levels must be a whole number from 2 up, not {levels!r}")
+        raise ConfigError(
+            f"{name}: levels must be a whole number from 2 to {MOST_POINTS:,}, not {levels!r}"
+        )
     found = Range(*numbers, log=log, whole=is_whole(name), levels=levels)
     if levels is not None and len(different := set(found.evenly())) < levels:
         raise ConfigError(
@@ -302,5 +308,5 @@ def _together(study: Study) -> Iterator[str]:
         levels = next((each.levels for each in study.factors if each.name == name), None)
         if levels is None:
             yield f"[study] baseline: {name} is none of the factors"
-        elif not isinstance(levels, Range) and level not in levels:
+        elif level not in levels:
             yield f"[study] baseline: {level!r} is none of the levels of {name}"
