@@ -73,7 +73,10 @@ class Policy:
                 f"not {self.q_table.shape}"
             )
         if not np.isfinite(self.q_table).all():
-            raise ConfigError("a table's values must be finite; this one has NaN or infinity in it")
+            raise ConfigError(
+                "a table's values must be finite; this one has NaN or infinity in it (if they grew "
+                "while it was learned, take a smaller step size, discount or first value)"
+            )
         object.__setattr__(self, "tiles", tiles_of(self.discretizer))
         choices = self.q_table.reshape(-1)
         if self.tiles is None:
