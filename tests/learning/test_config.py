@@ -104,7 +104,7 @@ def test_values_that_make_no_sense(changes, message):
         ({"until": 300}, 10, 300),
         ({"until": 300, "episodes": 60}, 1, 300),
         ({"until": 500, "evaluate_every": 7}, 7, 500),
-        ({"evaluate_every": 2_000}, 2_000, 475),
+        ({"evaluate_every": 200}, 200, 475),
         ({"max_episode_steps": 1_000}, None, 950),
     ],
 )

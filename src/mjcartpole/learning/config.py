@@ -307,6 +307,11 @@ class TrainConfig(RuleChanges):
         for name, most in _MOST.items():
             if getattr(self, name) > most:
                 raise ConfigError(f"{name} must be at most {most:,}; this one is larger")
+        if (self.evaluate_every or 0) > self.episodes:
+            raise ConfigError(
+                f"evaluate_every must be at most {self.episodes:,}, the episodes that there are, "
+                f"or nothing would be evaluated; not {self.evaluate_every:,}"
+            )
 
     def _check_until(self) -> None:
         until, most = self.until, self.rules.most_return
