@@ -66,16 +66,22 @@ def _dry_run(planned: Plan, folder: Path, how: StudyOptions, there: int | None) 
     if how.resume:
         print(f"left     {counted(len(left), 'run')}")
     if left:
-        expected = expect(left)
-        workers = worker_count(how.workers, len(left)) if there is None else min(there, len(left))
-        # More at once than there are cores share them.
-        share = min(workers, available_cores()) if there is None else workers
-        at_once = f"{workers} at once" if workers else "one worker; the scheduler has none yet"
+        expected, (cores, at_once) = expect(left), _at_once(len(left), how, there)
         print(
             f"steps    about {expected.steps:.2g}\n"
-            f"time     about {in_time(expected.seconds / max(1, share))} with {at_once}"
+            f"time     about {in_time(expected.seconds / cores)} with {at_once}"
         )
     return 0
+
+
+def _at_once(runs: int, how: StudyOptions, there: int | None) -> tuple[int, str]:
+    """Return how many cores do runs, here or of a cluster that has so many, and that in words."""
+    if there is None:
+        workers = worker_count(how.workers, runs)
+        return min(workers, available_cores()), f"{workers} at once"
+    if not there:
+        return 1, "one worker; the scheduler has none yet"
+    return (workers := min(there, runs)), f"{workers} at once"
 
 
 def in_time(seconds: float) -> str:
