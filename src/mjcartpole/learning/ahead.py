@@ -7,24 +7,24 @@ numbers are those of `stepping.advance`, which everything else waits for.
 
 from typing import Any
 
-import numpy as np
-
 from mjcartpole.learning.kinds import Rules, State
-from mjcartpole.learning.linking import AnyPhysics, compiled, for_each
+from mjcartpole.learning.linking import AnyPhysics, for_each, inlined
+from mjcartpole.learning.sines import sine_and_cosine
 from mjcartpole.learning.stepping import advance
 from mjcartpole.physics.cartpole_v1 import cartpole_v1_moved
 
 
-@compiled
-def _both_next(physics: AnyPhysics, state: State, sin: float, cos: float) -> Any:
+@inlined
+def _both_next(physics: AnyPhysics, state: State, sines: tuple[float, float]) -> Any:
+    sin, cos = sines
     x, x_dot, theta, theta_dot = state
     left = cartpole_v1_moved(x, x_dot, theta, theta_dot, physics.left, sin, cos)
     right = cartpole_v1_moved(x, x_dot, theta, theta_dot, physics.right, sin, cos)
-    return left, right, np.sin(left[2]), np.cos(left[2])
+    return left, right, sine_and_cosine(left[2])
 
 
 def _foresee_gym(physics: AnyPhysics, state: State) -> Any:
-    return _both_next(physics, state, np.sin(state[2]), np.cos(state[2]))
+    return _both_next(physics, state, sine_and_cosine(state[2]))
 
 
 def _foresee_nothing(physics: AnyPhysics, state: State) -> Any:
@@ -41,7 +41,7 @@ def _go_on_gym(
     physics: AnyPhysics, rules: Rules, state: State, action: int, ahead: Any
 ) -> tuple[State, Any]:
     state = ahead[1] if action == 1 else ahead[0]
-    return state, _both_next(physics, state, ahead[2], ahead[3])
+    return state, _both_next(physics, state, ahead[2])
 
 
 def _go_on(

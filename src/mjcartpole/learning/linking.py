@@ -18,6 +18,9 @@ INSIDE: Final[Any] = {"error_model": "numpy", "no_cpython_wrapper": True, "no_cf
 """Options of functions that only compiled code calls: no way from Python into each is compiled, and
 Numba takes what it has for one caller for all, where their options are the same."""
 
+INLINE: Final[Any] = {**INSIDE, "forceinline": True}
+"""The same of functions that a step is made of: a call of one would put its numbers into memory."""
+
 
 def link(library: Path | None) -> str:
     """Make MuJoCo's functions known to the compiler; returns why that failed, or nothing."""
@@ -35,6 +38,11 @@ def link(library: Path | None) -> str:
 def compiled(function: F) -> F:
     """Let compiled code call a function; for Python it stays what it is."""
     return register_jitable(**INSIDE)(function)
+
+
+def inlined(function: F) -> F:
+    """Do the same, and copy it to wherever it is called."""
+    return register_jitable(**INLINE)(function)
 
 
 def _array_at(kind: types.Type) -> Callable[[int], Any]:
@@ -63,7 +71,7 @@ def for_each(mujoco: F, gym: F, **others: Callable[..., Any]) -> Callable[[F], F
     functions: dict[str, Any] = {"MujocoPhysics": mujoco, **others}
 
     def register(stub: F) -> F:
-        @overload(stub, strict=False, jit_options=INSIDE)
+        @overload(stub, strict=False, jit_options=INLINE)
         def choose(physics: AnyPhysics, *others: object) -> Any:
             return functions.get(physics.instance_class.__name__, gym)
 
