@@ -36,6 +36,7 @@ _ENDLESS: dict[str, Any] = {
     **_grid((4, 4, 6, 4), (2.4, 1.5, 0.2095, 1.0)),
     "tilings": 8,
     "gamma": 0.995,
+    "td_lambda": 0.9,
     "alpha": 0.3,
     "alpha_final": 0.01,
     "q_init_low": 100.0,
@@ -99,7 +100,6 @@ _SWING_UP: dict[str, Any] = {
     "epsilon": 0.1,
     "q_init_low": 100.0,
     "q_init_high": 100.0,
-    "td_lambda": 0.8,
     "log_every": 1_000,
 }
 # Nodes on the limits, or edges would count as if nobody ever fell there.

@@ -45,6 +45,8 @@ class Parameters(q_learning.Parameters):
     """Discount per step."""
     alpha_final: float = 0.01
     """Step size once decayed."""
+    td_lambda: float | None = 0.9
+    """Learn after each episode from lambda-returns with this lambda; None: after each step."""
     epsilon_final: float = 0.0
     """Probability of a random action once decayed."""
     fit: Fit = "rod"

@@ -39,7 +39,7 @@ class Parameters(TiledParameters):
 
     alpha_final: float = 0.003
     """Step size once decayed."""
-    td_lambda: float | None = 0.9
+    td_lambda: float | None = 0.8
     """Learn after each episode from lambda-returns with this lambda; None: after each step."""
 
     def check_parameters(self) -> None:
