@@ -9,8 +9,10 @@ from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.training import train
 from nightly import few
 
-FORMER = {"episodes": 1_500, "alpha_final": 0.01, "decay": 0.5, "mirror": False}
+FORMER = {"episodes": 1_500, "td_lambda": 0.9, "alpha_final": 0.01, "decay": 0.5, "mirror": False}
 """What `tuned` was in 0.1.0."""
+
+ONE_STEP = {"td_lambda": None}
 
 FORMER_TWO_POLES = {"bins": (3, 1, 8, 8, 8, 8), "alpha": 0.1, "tilings": 1, "mirror": False}
 """What `two-poles` was; beside its episodes."""
@@ -32,19 +34,18 @@ PRESETS = [
         "fb1e1738f2b804879a922473f2d2b102c7a75ef072446b0e7882825370e95cef",
     ),
     (
-        TrainConfig.preset("tuned", td_lambda=None, seed=3, ties="random", **FORMER),
+        TrainConfig.preset("tuned", **FORMER | ONE_STEP, seed=3, ties="random"),
         "bb4e7e8850167ed80cf9e3d7af77c636a1257d09ed59f72607bbe663c0bd191a",
         "1d4c6c0a4cb513efd7f04cd822112a3dd075f26d0f1ca28ad57d5641a34ae01c",
     ),
     (
         TrainConfig.preset(
             "tuned",
+            **FORMER | ONE_STEP,
             backend="gym",
-            td_lambda=None,
             seed=3,
             ties="random",
             learn_last_step=False,
-            **FORMER,
         ),
         "c8f08b4653272a7be4815a23bc5bcb0678dcca4f7a5376c909924fff3d53416e",
         "ba352596ba442501e463af4a207b6e56acd34369ebd003672606b90ed0155acd",
