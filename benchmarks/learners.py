@@ -49,6 +49,7 @@ VARIANTS: dict[str, dict[str, Any]] = {
     "750 episodes": {"episodes": 750},
     "3,000 episodes": {"episodes": 3_000},
     "lambda 0.7": {"td_lambda": 0.7},
+    "lambda 0.9": {"td_lambda": 0.9},
     "lambda 0.97": {"td_lambda": 0.97},
     "random ties": {"ties": "random"},
     "constant alpha 0.1": {"alpha_final": 0.1},

@@ -8,10 +8,12 @@ from typing import Final
 import numpy as np
 
 from mjcartpole.cores import worker_count
+from mjcartpole.errors import ConfigError, SimulationError
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.evaluation import SEED
 from mjcartpole.learning.loop import play_episode
 from mjcartpole.learning.training import Training
+from mjcartpole.physics.symmetry import check_symmetric
 from mjcartpole.studies.parity.case import Subject, Vector
 from mjcartpole.studies.parity.result import Figure, Question, Result
 from mjcartpole.studies.parity.significance import STUDENT
@@ -48,6 +50,7 @@ class _Job:
     seed: int
     episodes: int
     evaluations: int
+    mirror: bool
 
 
 def learning(subject: Subject) -> Result:
@@ -66,10 +69,20 @@ def learning(subject: Subject) -> Result:
     if subject.gym_cannot:
         return question.skip(f"gymnasium cannot play this cart-pole: {subject.gym_cannot}")
     episodes, evaluations = (40, 3) if subject.quick else (1_000, 30)
-    jobs = [_Job(subject, seed, episodes, evaluations) for seed in range(SEEDS)]
+    mirror = _is_symmetric(subject)
+    jobs = [_Job(subject, seed, episodes, evaluations, mirror) for seed in range(SEEDS)]
     rows = np.array(_run_all(jobs, subject.quick))
     figures = _figures(rows[:, 0], rows[:, 1], relaxed=subject.against == "itself")
     return question.answer(figures)
+
+
+def _is_symmetric(subject: Subject) -> bool:
+    """Return whether the learner may learn of one side what the other one teaches."""
+    try:
+        check_symmetric(subject.cartpole)
+    except (ConfigError, SimulationError):
+        return False
+    return True
 
 
 def _figures(ours: Vector, gyms: Vector, *, relaxed: bool) -> tuple[Figure, ...]:
@@ -116,7 +129,7 @@ def _run_all(jobs: list[_Job], quick: bool) -> list[list[list[float]]]:
 
 def _run_one(job: _Job) -> list[list[float]]:
     """Return block means of the returns, and the mean greedy return, on either backend."""
-    config = TrainConfig.preset("tuned", episodes=job.episodes, seed=job.seed)
+    config = TrainConfig.preset("tuned", episodes=job.episodes, seed=job.seed, mirror=job.mirror)
     rows = []
     for env in (job.subject.ours(), job.subject.gyms()):
         training = Training(config, env)
