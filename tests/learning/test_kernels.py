@@ -9,6 +9,7 @@ import subprocess
 import sys
 import textwrap
 from pathlib import Path
+from types import FunctionType
 
 import numba
 import numpy as np
@@ -18,8 +19,8 @@ from hypothesis import strategies as st
 from numba.core.registry import cpu_target
 
 from mjcartpole import task
+from mjcartpole.learning import ahead, discretizer, episodes, kernels, schedules, sines, stepping
 from mjcartpole.learning import compiled as compiled_engine
-from mjcartpole.learning import discretizer, episodes, kernels, schedules, stepping
 from mjcartpole.learning.compiled import _arrays
 from mjcartpole.learning.config import TrainConfig, config_class
 from mjcartpole.learning.discretizer import Discretizer
@@ -168,6 +169,11 @@ def test_the_checksum_covers_all_that_is_compiled_from_elsewhere():
     for module in (kernels, stepping):
         functions = [value.py_func for value in vars(module).values() if hasattr(value, "py_func")]
         elsewhere |= {function.__module__ for function in functions}
+    for module in (ahead, sines, stepping):
+        functions = [value for value in vars(module).values() if isinstance(value, FunctionType)]
+        elsewhere |= {
+            each.__module__ for each in functions if each.__module__.startswith("mjcartpole.")
+        }
     reached = kernels._reached(*(getattr(m, each) for m in modules() for each in CALLED))
     covered = {module.__name__ for module in (*kernels._SHARED, kernels)}
     assert elsewhere <= covered | {function.__module__ for function in reached}

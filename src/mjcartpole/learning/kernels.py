@@ -25,7 +25,7 @@ from numba.core.runtime.nrt import rtsys
 from mjcartpole import rewards, task
 from mjcartpole.disturbances import effects
 from mjcartpole.learning import ahead as looking_ahead
-from mjcartpole.learning import discretizer, episodes, fitted, linking, stepping, tiles
+from mjcartpole.learning import discretizer, episodes, fitted, linking, sines, stepping, tiles
 from mjcartpole.learning.ahead import foresee, go_on
 from mjcartpole.learning.discretizer import Grid
 from mjcartpole.learning.episodes import Columns
@@ -359,7 +359,9 @@ def _sources(reward: Any, *functions: Any) -> str:
         texts = [inspect.getsource(each) for each in (*_SHARED, *sorted(files, key=repr), reward)]
     except (OSError, TypeError):
         return ""
-    return hashlib.sha256("".join([*texts, repr((LARGEST_SANE, constants))]).encode()).hexdigest()
+    return hashlib.sha256(
+        "".join([*texts, repr((LARGEST_SANE, sines.IS_GLIBC, constants))]).encode()
+    ).hexdigest()
 
 
 _SHARED: Final = (
@@ -370,6 +372,7 @@ _SHARED: Final = (
     episodes,
     fitted,
     linking,
+    sines,
     stepping,
     rewards,
     task,
