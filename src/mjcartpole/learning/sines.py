@@ -14,7 +14,7 @@ import numpy as np
 from mjcartpole.learning.linking import inlined
 
 SMALL = 0.125
-"""rad. Beyond, glibc looks up a table, and what is said of the series does not hold."""
+"""rad. Beyond, the bounds on what both may err by do not hold."""
 
 TINY = 2.0**-26
 """rad. Nearer to zero a sign could be lost."""
