@@ -22,10 +22,8 @@ TINY = 2.0**-26
 IS_GLIBC = platform.libc_ver()[0] == "glibc"
 """Of other libraries nothing is known, and they are always called."""
 
-_SINE = [(-1) ** n / math.factorial(2 * n + 1) for n in range(6)]
-_COSINE = [(-1) ** n / math.factorial(2 * n) for n in range(6)]
-_, _S3, _S5, _S7, _S9, _S11 = _SINE
-_, _C2, _C4, _C6, _C8, _C10 = _COSINE
+_S3, _S5, _S7, _S9, _S11 = ((-1) ** n / math.factorial(2 * n + 1) for n in range(1, 6))
+_C2, _C4, _C6, _C8, _C10 = ((-1) ** n / math.factorial(2 * n) for n in range(1, 6))
 
 
 @inlined

@@ -8,12 +8,11 @@ from typing import Final
 import numpy as np
 
 from mjcartpole.cores import worker_count
-from mjcartpole.errors import ConfigError, SimulationError
 from mjcartpole.learning.config import TrainConfig
 from mjcartpole.learning.evaluation import SEED
 from mjcartpole.learning.loop import play_episode
 from mjcartpole.learning.training import Training
-from mjcartpole.physics.symmetry import check_symmetric
+from mjcartpole.learning.training_grid import training_grid
 from mjcartpole.studies.parity.case import Subject, Vector
 from mjcartpole.studies.parity.result import Figure, Question, Result
 from mjcartpole.studies.parity.significance import STUDENT
@@ -77,12 +76,8 @@ def learning(subject: Subject) -> Result:
 
 
 def _is_symmetric(subject: Subject) -> bool:
-    """Return whether the learner may learn of one side what the other one teaches."""
-    try:
-        check_symmetric(subject.cartpole)
-    except (ConfigError, SimulationError):
-        return False
-    return True
+    """Return whether a training learns of one side what the other one teaches."""
+    return training_grid(TrainConfig.preset("tuned"), subject.cartpole).mirror
 
 
 def _figures(ours: Vector, gyms: Vector, *, relaxed: bool) -> tuple[Figure, ...]:
